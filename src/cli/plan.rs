@@ -98,7 +98,8 @@ pub(super) struct Arguments {
     /// Lowest allowed height in the base frame (mm): the mounting plane, or the floor for an arm on a pedestal.
     #[arg(long, value_name = "MM", default_value_t = 0.0, allow_negative_numbers = true)]
     floor: f64,
-    /// Assumed radius of the links about the lines between the joints (mm). Default: a twelfth of the reach.
+    /// Assumed radius of the links about the lines between the joints (mm), against obstacles and the arm itself; 0 disables the latter.
+    /// Default: a twelfth of the reach.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     link_radius: Option<f64>,
     /// Distance from the joint limits (°), at least --approach.

@@ -18,7 +18,7 @@ const USES: [(&str, &str); 13] = [
     ("papers", "arm calibration compensation estimation math planning programs report surfaces"),
     ("pictures", "arm calibration compensation math surfaces"),
     ("testing", ""),
-    ("measured", "arm calibration math"),
+    ("measured", "arm calibration math planning"),
 ];
 
 /// Crates that are only for tests.

@@ -31,7 +31,8 @@
 //! **Noise.** What the model left over is counted as noise. If the first poses scatter several times less, their own scatter is (`tracking/noise`).
 //!
 //! **Slow changes.** A drift may stay below every bound, since the filter follows it. What counts for programs is the whole way from the
-//! model that they were corrected with: the [`Departure`], which is judged at the end of every run.
+//! model that they were corrected with: the [`Departure`], which is judged at the end of every run. A [`Turn`] about axis 1 that the sensor saw is part of
+//! it.
 //!
 //! **What no reading tells** of arm and sensor together stays as it was (`gauge`).
 //!
@@ -62,6 +63,7 @@ mod options;
 mod response;
 pub mod state;
 mod tracker;
+mod turn;
 
 pub use alarm::{Alarm, Course};
 pub use departure::Departure;
@@ -70,3 +72,4 @@ pub use noise::Overstated;
 pub use options::Options;
 pub use state::State;
 pub use tracker::{PoseUpdate, Tracker, first_poses};
+pub use turn::Turn;

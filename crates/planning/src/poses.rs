@@ -1,7 +1,7 @@
 //! Optimal experiment design: informative measurement poses, their order, and the program that visits them.
 //!
 //! - [`candidate`]: random reachable poses visible to the sensor; [`cable`]: clearance of a cable from the arm;
-//!   [`keep_out`]: collision checks against floor and boxes;
+//!   [`keep_out`]: collision checks against floor, boxes and the arm's own bodies (`own_bodies`);
 //! - [`rows`]: whitened Jacobian of the readings;
 //! - [`design`]: D-optimal choice among the candidates;
 //! - [`field`]: choice for an error that no cause of a diagnosis explains;
@@ -13,6 +13,7 @@
 
 mod blank;
 mod options;
+mod own_bodies;
 mod roadmap;
 mod setup;
 pub mod candidate;
@@ -83,8 +84,8 @@ pub struct Quality {
     pub log_det: f64,
     /// The same for as many random candidates, mean of ten draws.
     pub random_log_det: f64,
-    /// Predicted standard deviation of a reading under the fitted arm, root mean square over candidates that were not chosen
-    /// (mm). Unobservable parameters have no effect on it.
+    /// Predicted standard deviation of a reading under the fitted arm, of a length or of each coordinate as the noise is stated, root mean
+    /// square over candidates that were not chosen (mm). Unobservable parameters have no effect on it.
     pub reading_sigma_mm: f64,
     /// The same after as many random candidates, mean of ten draws (mm).
     pub random_reading_sigma_mm: f64,

@@ -291,9 +291,9 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
         match (estimated.noise_floor_mm, estimated.beyond_noise_mm) {
             (Some(_), Some(_)) => floor.note("scatter of repeated poses"),
             (Some(_), None) => floor.note(
-                "of rounding alone; that of the sensor is not known, since too few poses were repeated",
+                "of rounding alone; that of the sensor is not known, since too few poses were repeated from the same sides",
             ),
-            (None, _) => floor.note("unknown: too few poses were repeated and nothing is rounded"),
+            (None, _) => floor.note("unknown: too few poses were repeated from the same sides and nothing is rounded"),
         },
     ]);
     figures.extend(found.held_out_orientation.as_ref().map(|turns| {

@@ -156,7 +156,7 @@ fn verdict(plan: &Plan) -> Verdict {
     let quality = &plan.quality;
     if plan.geometry {
         reasons.push(format!(
-            "predicted 1σ of a reading at any other pose: {:.3} mm after one visit to each pose, {:.3} mm after as many random poses",
+            "predicted 1σ of a reading at any other pose (a length, or each coordinate, as --sigma counts): {:.3} mm after one visit to each pose, {:.3} mm after as many random poses",
             quality.reading_sigma_mm, quality.random_reading_sigma_mm
         ));
     }
@@ -188,7 +188,10 @@ fn verdict(plan: &Plan) -> Verdict {
         );
     }
     let (status, headline) = match rough {
-        0 => (Status::Good, "The program may run: links and target stay clear of the stated obstacles"),
+        0 => (
+            Status::Good,
+            "The program may run: links and target stay clear of the stated obstacles and of the arm itself",
+        ),
         _ => (Status::Warning, "The program may run if the cable is unhooked between some poses"),
     };
     Verdict::new(status, headline, reasons)
@@ -252,7 +255,7 @@ fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
     vec![
         rows,
         KeyFigure::new("Remaining uncertainty", plan.quality.reading_sigma_mm, 3, "mm")
-            .note("predicted 1σ of a reading at any other pose"),
+            .note("predicted 1σ of a reading at any other pose: a length, or each coordinate"),
         KeyFigure::new("With random poses", plan.quality.random_reading_sigma_mm, 3, "mm")
             .note(format!("for comparison, {}", poses(plan))),
         KeyFigure::new(

@@ -70,6 +70,10 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     };
     let processed = format!("{fresh} new poses processed, {changes}");
     let (status, headline) = match (&departure, departed) {
+        (_, Some(now)) if !now.is_of_shape => {
+            let but = if alarms.is_empty() { ", but" } else { ";" };
+            (Status::Warning, format!("{processed}{but} {}", turn_headline(now)))
+        }
         (_, Some(now)) => {
             let but = if alarms.is_empty() { ", but" } else { ";" };
             let headline = format!(
@@ -97,7 +101,9 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
     let earlier = departed.filter(|_| alarms.is_empty()).and_then(|now| now.told.as_ref());
     reasons.extend(earlier.map(|alarm| format!("told in an earlier run: {alarm}")));
-    reasons.extend(departed.map(departure_sentence));
+    reasons.extend(departed.filter(|now| now.is_of_shape).map(departure_sentence));
+    reasons.extend(departed.and_then(turn_sentence));
+    reasons.extend(which_moved(alarms));
     let (status, headline) = if tracker.mostly_set_aside() {
         reasons.insert(
             0,
@@ -114,6 +120,10 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     if status == Status::Warning {
         reasons.push(
             match departed {
+                Some(now) if !now.is_of_shape => {
+                    "what to do: find out what turned, as said above. If it was joint 1 or the base, put it right or teach the work objects \
+                     again; then begin a new track (--state)"
+                }
                 Some(_) => {
                     "what to do: measure the arm, identify it, and compensate the original programs again; until then, the model written \
                      here is the best known. Begin a new track with the new model (--model, --state)"
@@ -150,6 +160,48 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         KeyFigure::new("Changes", state.alarms.len(), 0, "").note(format!("{} in the new poses", alarms.len())),
     ]);
     page.paragraph(format!("Model written: {model}"));
+}
+
+/// The headline where the arm turned and kept its shape.
+fn turn_headline(now: &Departure) -> String {
+    now.turn.as_ref().map_or_else(String::new, |turn| {
+        format!(
+            "arm and sensor are turned against each other by {:.3}° about axis 1, {:.3} mm at the target: the programs are not known to \
+             remain valid",
+            turn.angle_rad.to_degrees(),
+            turn.rms_mm
+        )
+    })
+}
+
+/// A turn about axis 1, what it may be, and how to tell.
+fn turn_sentence(now: &Departure) -> Option<String> {
+    let turn = now.turn.as_ref().filter(|turn| turn.is_significant)?;
+    Some(format!(
+        "since the first poses, arm and sensor have turned against each other by {:.4} ± {:.4}° about axis 1, which is {:.3} mm RMS at the target. \
+         Joint 1 lost its zero, or the base turned: then programs on parts that stand beside the arm are off by as much. Or the sensor was \
+         moved about axis 1: then they are right. The readings are the same. To tell: read three points fixed to the floor; if they \
+         moved for the sensor, it was the sensor. Else read points on the arm's foot; if they moved, it was the base, if not, joint 1",
+        turn.angle_rad.to_degrees(),
+        turn.sigma_rad.to_degrees(),
+        turn.rms_mm
+    ))
+}
+
+/// What readings cannot tell of the new changes, and what to measure.
+fn which_moved(alarms: &[Alarm]) -> Vec<String> {
+    let any = |name: &str| alarms.iter().any(|alarm| alarm.parameter == name);
+    let target = any("the touched point").then(|| {
+        "the touched point: the arm in the model for programs stays as it was. A changed last link or a lost zero of joint 6 would move the \
+         readings alike; if the reflector was neither exchanged nor bumped, check the mark of joint 6, and touch a known point with the tool"
+            .to_owned()
+    });
+    let sensor = any("the sensor against the arm's base").then(|| {
+        "sensor or base: the readings tell only that one moved against the other. Read three points fixed to the floor: if they moved for the \
+         sensor, it was the sensor, and the programs are right; if not, it was the base, and programs on parts beside the arm are off"
+            .to_owned()
+    });
+    target.into_iter().chain(sensor).collect()
 }
 
 /// How far the arm has moved, and its parameters that moved most.
@@ -249,6 +301,11 @@ pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
             let [since_mm, since_expected_mm] = now.since_first_poses_mm.map_or([None; 2], |of| of.map(Some));
             json!({
                 "rms_mm": now.rms_mm, "expected_mm": now.expected_mm, "significant": now.is_significant,
+                "of_shape": now.is_of_shape,
+                "turn_about_axis_1": now.turn.as_ref().map(|turn| json!({
+                    "angle_rad": turn.angle_rad, "sigma_rad": turn.sigma_rad, "rms_mm": turn.rms_mm,
+                    "significant": turn.is_significant,
+                })),
                 "since_first_poses_mm": since_mm, "since_first_poses_expected_mm": since_expected_mm,
             })
         }),

@@ -54,6 +54,9 @@ pub struct Alarm {
     pub since_time_h: Option<f64>,
     /// Name of the changed parameter or group; empty where nothing explains the poses.
     pub parameter: String,
+    /// What an effect's parameter is, in words; absent where the name says it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub label: Option<String>,
     /// Unit.
     pub unit: String,
     /// Kind of change.
@@ -76,6 +79,22 @@ pub struct Alarm {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Part>,
 }
+
+/// Value and standard deviation with the digits that tell something: two of the standard deviation, four decimals where these are enough.
+fn with_sigma(value: f64, sigma: f64) -> String {
+    let places = if sigma > 0.0 && sigma.is_finite() { 1.0 - sigma.log10().floor() } else { 4.0 };
+    if places > MOST_DECIMALS {
+        let exponent = value.abs().max(sigma).log10().floor() as i32;
+        let scale = 10f64.powi(-exponent);
+        let decimals = (places as i32 + exponent).max(0) as usize;
+        return format!("({:.decimals$} ± {:.decimals$})e{exponent}", value * scale, sigma * scale);
+    }
+    let decimals = places.max(4.0) as usize;
+    format!("{value:.decimals$} ± {sigma:.decimals$}")
+}
+
+/// Most decimals without an exponent.
+const MOST_DECIMALS: f64 = 6.0;
 
 /// Factor to the displayed unit, and that unit.
 fn display_unit(unit: &str) -> (f64, &str) {
@@ -130,16 +149,16 @@ impl fmt::Display for Alarm {
             Course::Jump => "jumped",
             Course::Drift => "has drifted",
         };
-        let whole = if self.parts.is_empty() { "" } else { ", which moved the readings" };
-        write!(
-            f,
-            "{} {verb}{whole} by {:.4} ± {:.4} {unit} since row {} of {}",
-            self.parameter,
-            self.shift * scale,
-            self.sigma * scale,
-            self.since_row,
-            self.since_file
-        )?;
+        let name = self.label.as_ref().unwrap_or(&self.parameter);
+        write!(f, "{name} {verb}")?;
+        let is_whole = !self.parts.is_empty();
+        if is_whole && self.shift < 2.0 * self.sigma {
+            write!(f, ", by how much the poses do not tell yet,")?;
+        } else {
+            let whole = if is_whole { ", which moved the readings" } else { "" };
+            write!(f, "{whole} by {} {unit}", with_sigma(self.shift * scale, self.sigma * scale))?;
+        }
+        write!(f, " since row {} of {}", self.since_row, self.since_file)?;
         if let Some(hours) = self.since_time_h {
             write!(f, " (t = {hours:.3} h)")?;
         }

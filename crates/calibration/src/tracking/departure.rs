@@ -2,7 +2,8 @@
 //!
 //! A drift may be slower than any bound of the innovations, since the filter follows it. Programs were corrected with the first model, so
 //! what counts for them is the whole way since. It is the displacement of the target over the measured region, after its best placement:
-//! a motion of the base and of the target's mounting is not the arm's shape.
+//! a motion of the base and of the target's mounting is not the arm's shape. A turn about axis 1 that the sensor saw counts by itself
+//! (`turn`).
 //!
 //! **Two distances.** From the first model, whose uncertainty can hide a change; and from the arm as the first poses of the track showed
 //! it, which is known better. The arm is another one where either is beyond what the uncertainties explain.
@@ -15,6 +16,7 @@ use nalgebra::{DMatrix, Rotation3, Vector3};
 
 use super::alarm::{Alarm, Course};
 use super::tracker::Tracker;
+use super::turn::{Turn, is_of_joint_1};
 use crate::identification::placement::{fill, place};
 use truegrind_arm::model::{Joints, Model};
 
@@ -30,9 +32,13 @@ pub struct Departure {
     /// Parameters that moved by more than four of the standard deviations that they began with: name, unit, by how much, and the present
     /// standard deviation; those that moved most first.
     pub parameters: Vec<(String, String, f64, f64)>,
+    /// A turn about axis 1 against the sensor, which is not part of the distances.
+    pub turn: Option<Turn>,
     /// An earlier or present alarm that tells a change of the arm.
     pub told: Option<Alarm>,
-    /// Whether the arm is another one now.
+    /// Whether the arm has another shape now.
+    pub is_of_shape: bool,
+    /// Whether the arm is another one now, by its shape or a turn.
     pub is_significant: bool,
 }
 
@@ -98,6 +104,9 @@ impl Tracker {
         });
         let noise_mm = self.state.sigma_mm * (self.state.sensor.scalars().min(3) as f64).sqrt();
         let told = self.state.alarms.iter().rev().find(|alarm| self.tells_of_the_arm(alarm)).cloned();
+        // Joint 1 moves no shape: a turn about its axis counts by itself.
+        let told_of_shape =
+            self.state.alarms.iter().any(|alarm| self.tells_of_the_arm(alarm) && !is_of_joint_1(alarm));
         let sigmas = self.sigmas();
         let mut parameters: Vec<(f64, (String, String, f64, f64))> = self
             .initial
@@ -112,15 +121,18 @@ impl Tracker {
             })
             .collect();
         parameters.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let turn = self.turn(&poses);
+        let is_of_shape = whole.is_beyond(SHARE * self.initial.geometry.held_out.rmse)
+            || since.as_ref().is_some_and(|since| since.is_beyond(SHARE * noise_mm))
+            || (told_of_shape && std::iter::once(&whole).chain(&since).any(|d| d.rms_mm > d.expected_mm));
         Some(Departure {
             rms_mm: whole.rms_mm,
             expected_mm: whole.expected_mm,
             since_first_poses_mm: since.as_ref().map(|since| [since.rms_mm, since.expected_mm]),
             parameters: parameters.into_iter().map(|(_, told)| told).collect(),
-            is_significant: whole.is_beyond(SHARE * self.initial.geometry.held_out.rmse)
-                || since.as_ref().is_some_and(|since| since.is_beyond(SHARE * noise_mm))
-                || (told.is_some()
-                    && std::iter::once(&whole).chain(&since).any(|d| d.rms_mm > d.expected_mm)),
+            is_of_shape,
+            is_significant: is_of_shape || turn.as_ref().is_some_and(|turn| turn.is_significant),
+            turn,
             told,
         })
     }

@@ -10,7 +10,9 @@
 //! Parameters that move together, such as the six of a knocked sensor, form a group: with l and S the vector and matrix of the
 //! same expressions, ratio = lᵀ (S + Λ⁻¹)⁻¹ l, Λ the prior covariance of the displacement. A group is preferred to the best
 //! single parameter where its [`surprisal`] is larger by [`GROUP_MARGIN`]: unmodelled effects are smooth in the joints, and six
-//! parameters follow them where one cannot.
+//! parameters follow them where one cannot. But what a group does by itself is the group: a reflector that was exchanged or bumped moves
+//! the readings exactly as a bend of the last link, which it is fixed to. By their size the two are not alike: reflectors move by
+//! millimetres, links do not bend by degrees. Such parameters ([`Group::covers`]) are rivals at most.
 //!
 //! The sums of a drift are sums of those of a jump: B_s = B_{s+1} + A_s, and Σ w² = 2 Σ w(w + 1)/2 − Σ w. With CCᵀ = P⁻¹ + A
 //! the product C⁻¹B is accumulated instead of B, since B(:,k)ᵀ M B(:,l) is the product of its columns k and l: a pose costs
@@ -76,6 +78,20 @@ pub struct Group {
     pub name: String,
     /// Index and prior standard deviation of each parameter.
     pub members: Vec<(usize, f64)>,
+    /// Parameters that move the readings only as the members together can, each with the largest size that is a likely rival.
+    pub covers: Vec<(usize, f64)>,
+}
+
+impl Group {
+    /// Whether the group does all that a parameter does.
+    fn does_all_of(&self, parameter: usize) -> bool {
+        !self.covers.is_empty()
+            && (self.is_member(parameter) || self.covers.iter().any(|(k, _)| *k == parameter))
+    }
+
+    fn is_member(&self, parameter: usize) -> bool {
+        self.members.iter().any(|(k, _)| *k == parameter)
+    }
 }
 
 /// Several parameters that jumped at once.
@@ -228,16 +244,16 @@ pub fn locate(
     let explained = &j * &mg;
     let history = History { per, j, r, whitened, explained };
     let mut best: Vec<[Option<Change>; 2]> = vec![[None; 2]; p];
-    let mut together: Option<GroupChange> = None;
+    let mut together: Vec<Option<GroupChange>> = vec![None; groups.len()];
     let mut sums = Sums::new(p);
     for since in (0..n).rev() {
         sums.add(&history, since);
         for (index, group) in groups.iter().enumerate() {
             let Some((shifts, factor, ratio)) = sums.together(group) else { continue };
-            let gain = |t: &GroupChange| surprisal(groups[t.group].members.len(), t.ratio);
-            if together.as_ref().is_none_or(|t| surprisal(group.members.len(), ratio) > gain(t)) {
+            // All have as many degrees of freedom: the largest ratio is the least probable one.
+            if together[index].as_ref().is_none_or(|t| ratio > t.ratio) {
                 let shifts = shifts.iter().map(|s| -s).collect();
-                together =
+                together[index] =
                     Some(GroupChange { group: index, since, shifts, covariance: factor.inverse(), ratio });
             }
         }
@@ -255,13 +271,13 @@ pub fn locate(
             }
         }
     }
-    compare_changes(&best, together, groups)
+    compare_changes(&best, &together, groups)
 }
 
 /// Selects the best change and its alternatives from the best of each parameter, form and group.
 fn compare_changes(
     best: &[[Option<Change>; 2]],
-    together: Option<GroupChange>,
+    together: &[Option<GroupChange>],
     groups: &[Group],
 ) -> Option<Explanation> {
     let better = |[a, b]: &[Option<Change>; 2]| match (a, b) {
@@ -275,13 +291,22 @@ fn compare_changes(
     if let Some((at, _)) = tied.max_by_key(|(_, change)| change.parameter) {
         all[..=at].rotate_right(1);
     }
+    let gain = |t: &GroupChange| surprisal(groups[t.group].members.len(), t.ratio);
+    let covering = covering(all.first()?, together, groups);
+    if let (Some(group), None) = (groups.iter().find(|g| g.does_all_of(all[0].parameter)), covering) {
+        // Another course than a jump: by one of the members, if they explain it at all.
+        if let Some(at) = all.iter().position(|change| group.is_member(change.parameter)) {
+            all[..=at].rotate_right(1);
+        }
+    }
     let first = *all.first()?;
     let near = |c: &Change| c.ratio > first.ratio - ALTERNATIVE_MARGIN;
-    let gain =
-        |t: &GroupChange| surprisal(groups[t.group].members.len(), t.ratio) - surprisal(1, first.ratio);
-    let (clear, nearly): (Option<GroupChange>, Option<usize>) = match together {
-        Some(t) if gain(&t) > GROUP_MARGIN.0.max(GROUP_MARGIN.1 * first.ratio) => (Some(t), None),
-        Some(t) if gain(&t) > -ALTERNATIVE_MARGIN => (None, Some(t.group)),
+    let strongest = together.iter().flatten().max_by(|a, b| gain(a).total_cmp(&gain(b)));
+    let more = |t: &GroupChange| gain(t) - surprisal(1, first.ratio);
+    let (clear, nearly): (Option<GroupChange>, Option<usize>) = match (covering, strongest) {
+        (Some(covering), _) => (Some(covering.clone()), None),
+        (_, Some(t)) if more(t) > GROUP_MARGIN.0.max(GROUP_MARGIN.1 * first.ratio) => (Some(t.clone()), None),
+        (_, Some(t)) if more(t) > -ALTERNATIVE_MARGIN => (None, Some(t.group)),
         _ => (None, None),
     };
     let other = best[first.parameter].iter().flatten().find(|c| c.form != first.form).copied();
@@ -293,3 +318,18 @@ fn compare_changes(
         nearly,
     })
 }
+
+/// The group that does all that the best single change does, and explains as much.
+fn covering<'a>(
+    best: &Change,
+    together: &'a [Option<GroupChange>],
+    groups: &[Group],
+) -> Option<&'a GroupChange> {
+    let does = |t: &&GroupChange| groups[t.group].does_all_of(best.parameter);
+    let explains = |t: &&GroupChange| t.ratio > best.ratio * (1.0 - COVERED);
+    together.iter().flatten().filter(does).find(explains)
+}
+
+/// A group explains as much as what it covers where its ratio is not smaller by more than this share: its members have priors, which
+/// cost a little.
+const COVERED: f64 = 0.02;

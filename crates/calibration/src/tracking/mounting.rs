@@ -12,6 +12,7 @@ use super::bounds::accident_bound;
 use super::gauge::Gauge;
 use super::state::{PoseRecord, Snapshot, extend_region};
 use super::tracker::Tracker;
+use super::turn::SENSOR;
 use crate::identification::calibration::Frames;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::registration::points;
@@ -199,8 +200,9 @@ fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Al
         since_time_h: first.time_h,
         parameter: match found.what {
             Mounted::Target => "the touched point".to_owned(),
-            Mounted::Sensor => "the sensor against the arm's base".to_owned(),
+            Mounted::Sensor => SENSOR.to_owned(),
         },
+        label: None,
         unit: "mm".to_owned(),
         course: Course::Mounted,
         shift: (found.pose.translation.vector - old.translation.vector).norm(),

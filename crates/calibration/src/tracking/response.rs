@@ -4,11 +4,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::alarm::{Alarm, Course, Part};
 use super::bounds::{accident_bound, window_bound};
-use super::locate::{Change, Explanation, Form, Group, GroupChange, locate};
+use super::locate::{ALTERNATIVE_MARGIN, Change, Explanation, Form, Group, GroupChange, locate};
 use super::mounting::Beside;
 use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
-use truegrind_arm::parameter::Parameter;
+use super::turn::SENSOR;
+use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::median;
 
@@ -155,6 +156,7 @@ impl Tracker {
             since_row: onset.row,
             since_time_h: onset.time_h,
             parameter: name(best.parameter),
+            label: self.label(best.parameter),
             unit: self.parameters[best.parameter].unit().to_owned(),
             course: match (found.other_form, best.form) {
                 (Some(_), _) => Course::Open,
@@ -175,7 +177,7 @@ impl Tracker {
             parts: Vec::new(),
         };
         if let Some(together) = &found.together {
-            self.describe_group(&mut alarm, &groups[together.group], together);
+            self.describe_group(&mut alarm, &groups[together.group], together, found);
         }
         Some(alarm)
     }
@@ -197,6 +199,7 @@ impl Tracker {
             since_row: first.row,
             since_time_h: first.time_h,
             parameter: String::new(),
+            label: None,
             unit: String::new(),
             course,
             shift: 0.0,
@@ -225,8 +228,17 @@ impl Tracker {
         None
     }
 
+    /// What a parameter of an effect is, in words.
+    fn label(&self, k: usize) -> Option<String> {
+        let Parameter::Effect { index, parameter } = self.parameters[k] else { return None };
+        let effect = self.initial.model.effects.get(index)?;
+        let of = effect.joint().map_or(String::new(), |joint| format!(" of joint {}", joint + 1));
+        let named = effect.parameters().get(parameter).map(|parameter| parameter.name)?;
+        Some(format!("{}{of} ({named})", effect.name().replace('-', " ")))
+    }
+
     /// Describes the displacement of a group in an alarm.
-    fn describe_group(&self, alarm: &mut Alarm, group: &Group, together: &GroupChange) {
+    fn describe_group(&self, alarm: &mut Alarm, group: &Group, together: &GroupChange, found: &Explanation) {
         let part = |(a, (k, _)): (usize, &(usize, f64))| Part {
             parameter: self.parameters[*k].to_string(),
             unit: self.parameters[*k].unit().to_owned(),
@@ -236,7 +248,15 @@ impl Tracker {
         alarm.parts = group.members.iter().enumerate().map(part).collect();
         (alarm.shift, alarm.sigma) = self.displacement(group, together);
         (alarm.parameter, alarm.unit, alarm.course) = (group.name.clone(), "mm".to_owned(), Course::Jump);
-        alarm.alternatives.clear();
+        alarm.label = None;
+        let rivals = group.covers.iter().filter(|(k, largest)| {
+            let near = |change: &&Change| change.parameter == *k && change.shift.abs() <= *largest;
+            std::iter::once(&found.best)
+                .chain(&found.alternatives)
+                .filter(near)
+                .any(|change| change.ratio > together.ratio - ALTERNATIVE_MARGIN)
+        });
+        alarm.alternatives = rivals.map(|(k, _)| self.parameters[*k].to_string()).collect();
     }
 
     /// RMS displacement of the changed poses' readings (mm), and its standard deviation. The displacement of a frame's origin would be
@@ -272,8 +292,8 @@ impl Tracker {
         let mut groups: Vec<Group> = Vec::new();
         for (k, parameter) in self.parameters.iter().enumerate() {
             let name = match parameter {
-                Parameter::SensorFrame(_) => "the sensor against the arm's base".to_owned(),
-                Parameter::Target(_) => "the touched point".to_owned(),
+                Parameter::SensorFrame(_) => SENSOR.to_owned(),
+                Parameter::Target(_) => TOUCHED_POINT.to_owned(),
                 Parameter::Outlet { anchor: 0, .. } => "the outlet".to_owned(),
                 Parameter::Outlet { anchor, .. } => format!("outlet {}", anchor + 1),
                 _ => continue,
@@ -281,8 +301,14 @@ impl Tracker {
             let reach = if parameter.is_length() { REACH_MM } else { REACH_RAD };
             match groups.iter_mut().find(|g| g.name == name) {
                 Some(group) => group.members.push((k, reach)),
-                None => groups.push(Group { name, members: vec![(k, reach)] }),
+                None => groups.push(Group { name, members: vec![(k, reach)], covers: Vec::new() }),
             }
+        }
+        // Whatever is fixed to the last link moves with it: no reading tells a bent flange or a lost zero of joint 6 from a moved target.
+        if let Some(target) = groups.iter_mut().find(|group| group.name == TOUCHED_POINT) {
+            let carried = self.parameters.iter().enumerate();
+            target.covers =
+                carried.filter_map(|(k, parameter)| Some((k, largest_of_last_link(parameter)?))).collect();
         }
         groups
     }
@@ -367,3 +393,24 @@ impl Tracker {
         (self.state.reference, self.state.middle) = (snapshot.clone(), snapshot);
     }
 }
+
+/// Largest change of a parameter of the last link that is a likely rival of a moved target; `None` for other parameters. A joint may lose
+/// its zero by degrees; a flange is not bent by as much without more being broken.
+fn largest_of_last_link(parameter: &Parameter) -> Option<f64> {
+    match parameter {
+        Parameter::Link { joint: 5, coordinate } => Some(match coordinate {
+            LinkCoordinate::Theta => ZERO_LOST_RAD,
+            LinkCoordinate::Alpha | LinkCoordinate::Beta => BENT_RAD,
+            LinkCoordinate::A | LinkCoordinate::D => BENT_MM,
+        }),
+        _ => None,
+    }
+}
+
+/// Sizes up to which the last link or its joint are likely to have changed (rad, mm).
+const ZERO_LOST_RAD: f64 = 0.09;
+const BENT_RAD: f64 = 0.003;
+const BENT_MM: f64 = 0.3;
+
+/// What the target is called.
+const TOUCHED_POINT: &str = "the touched point";

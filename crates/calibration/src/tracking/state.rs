@@ -136,6 +136,12 @@ pub struct State {
     /// Snapshot after the first poses, before any change: what the arm was when the track began.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) start: Option<Snapshot>,
+    /// Snapshot from which on a turn of the arm against the sensor counts: after the first poses, or since the sensor was moved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) placed: Option<Snapshot>,
+    /// Pose number at which the next such snapshot is taken; 0 for none.
+    #[serde(default)]
+    pub(super) placed_at: usize,
     /// Scatter of the first poses, in units of the noise that the track counts with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) start_scatter: Option<f64>,

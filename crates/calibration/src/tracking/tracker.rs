@@ -132,6 +132,8 @@ impl Tracker {
             reference: snapshot.clone(),
             middle: snapshot,
             start: None,
+            placed: None,
+            placed_at: options.first_poses + options.window.max(1),
             start_scatter: None,
             replaced_sigma_mm: None,
             region: model.region.clone(),
@@ -259,7 +261,14 @@ impl Tracker {
             self.state.start_scatter = self.late_scatter();
             self.state.start = Some(Snapshot::of(&self.filter, self.state.history.len()));
         }
+        if self.state.poses == self.state.placed_at {
+            self.state.placed = Some(Snapshot::of(&self.filter, 0));
+        }
         if let Some(alarm) = self.alarm() {
+            if self.is_of_sensor(&alarm) {
+                self.state.placed = None;
+                self.state.placed_at = self.state.poses + self.state.options.window.max(1);
+            }
             self.state.alarms.push(alarm.clone());
             return Some(alarm);
         }

@@ -6,6 +6,7 @@
 mod diagnosis;
 mod identification;
 mod import;
+mod own_bodies;
 mod plausibility;
 mod registration;
 mod repeats;

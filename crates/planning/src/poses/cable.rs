@@ -1,30 +1,49 @@
 //! Clearance of a cable from the arm's links.
 //!
-//! Links are capsules: the segments between the origins of neighbouring joint frames, with one radius. The wrist and the
-//! tool are excluded, since the cable is attached there.
+//! Links are capsules with one radius: the segments between the origins of neighbouring joint frames, and the arm's own bodies as
+//! [`own_bodies`](super::own_bodies) assumes them. The wrist and the tool are excluded, since the cable is attached there.
 
 use nalgebra::{Point3, Vector3};
 
+use super::own_bodies::OwnBodies;
 use truegrind_arm::chain::Chain;
 
 /// Joint frames between which segments are checked: from the base to the wrist.
 const FRAMES: usize = 5;
 
+/// Length of the cable before the hook that can pass the wrist (mm).
+const FREE_MM: f64 = 120.0;
+
 /// Smallest distance from the segment between `from` and `to` (mm, base) to the links of an arm (mm).
 ///
 /// The last `free_mm` before `to` are excluded, since the hook is next to the wrist.
 pub fn clearance_mm(frames: &Chain<f64>, from: &Vector3<f64>, to: &Vector3<f64>, free_mm: f64) -> f64 {
-    let length = (to - from).norm();
-    if length <= free_mm {
-        return f64::INFINITY;
-    }
-    let end = from + (to - from) * ((length - free_mm) / length);
+    let Some(end) = end_before(from, to, free_mm) else { return f64::INFINITY };
     let mut smallest = f64::INFINITY;
     for pair in frames.origin[..FRAMES].windows(2) {
         let (a, b) = (Vector3::from(pair[0]), Vector3::from(pair[1]));
         smallest = smallest.min(segment_distance(from, &end, &a, &b));
     }
     smallest
+}
+
+/// The same, to the links and to the arm's own bodies.
+pub(super) fn clearance_of_arm_mm(
+    frames: &Chain<f64>,
+    own: &OwnBodies,
+    from: &Vector3<f64>,
+    to: &Vector3<f64>,
+) -> f64 {
+    let Some(end) = end_before(from, to, FREE_MM) else { return f64::INFINITY };
+    let own = own.lines(frames).into_iter().flatten();
+    own.map(|[a, b]| segment_distance(from, &end, &a, &b))
+        .fold(clearance_mm(frames, from, to, FREE_MM), f64::min)
+}
+
+/// Where the checked part of a cable ends; `None` if all of it is next to the hook.
+fn end_before(from: &Vector3<f64>, to: &Vector3<f64>, free_mm: f64) -> Option<Vector3<f64>> {
+    let length = (to - from).norm();
+    (length > free_mm).then(|| from + (to - from) * ((length - free_mm) / length))
 }
 
 /// Distance between two segments p1–q1 and p2–q2: the closest points of the two lines, clamped to the segments

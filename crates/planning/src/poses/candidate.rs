@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::blank::blank_row;
-use super::cable::clearance_mm;
+use super::cable::clearance_of_arm_mm;
 use super::keep_out::{CollisionChecker, KeepOut};
 use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
@@ -28,7 +28,7 @@ pub struct Bounds {
     pub box_mm: Option<[[f64; 3]; 2]>,
     /// Shortest and longest cable, or distance to the sensor (mm).
     pub distance_mm: Option<[f64; 2]>,
-    /// Distance of a cable, or of a tracker's line of sight, from the segments between the joints (mm); `None` disables the check.
+    /// Distance of a cable, or of a tracker's line of sight, from the lines in the links (mm); `None` disables the check.
     pub clearance_mm: Option<f64>,
     /// Obstacles.
     pub space: KeepOut,
@@ -73,7 +73,7 @@ pub struct RejectionCounts {
     pub distance: usize,
     /// The cable or the line of sight too near to a link.
     pub hidden: usize,
-    /// A link or the touched point in collision, at the pose or on its approach.
+    /// A link or the touched point in collision, with an obstacle or the arm itself, at the pose or on its approach.
     pub blocked: usize,
 }
 
@@ -82,7 +82,8 @@ impl fmt::Display for RejectionCounts {
         write!(
             f,
             "{} too close to a singularity, {} outside the box, {} too close to or too far from the sensor, {} with the \
-            cable or the line of sight too close to a link, {} with the arm below the floor or in a box to keep out of",
+            cable or the line of sight too close to a link, {} with the arm below the floor, in a box to keep out of or \
+            inside itself",
             self.singular, self.outside, self.distance, self.hidden, self.blocked
         )?;
         match self.sum {
@@ -94,9 +95,6 @@ impl fmt::Display for RejectionCounts {
 
 /// Most random poses drawn for each required candidate.
 const DRAWS_PER_CANDIDATE: usize = 60;
-
-/// Length of the cable before the hook that can pass the wrist (mm).
-pub(super) const FREE_MM: f64 = 120.0;
 
 /// Draws until `count` poses are accepted or the limit of draws is reached. Cables alternate.
 pub fn draw(
@@ -149,7 +147,7 @@ pub fn draw(
             continue;
         }
         if let Some(required) = bounds.clearance_mm
-            && clearance_mm(&frames, &origin, &touched.coords, FREE_MM) < required
+            && clearance_of_arm_mm(&frames, checker.own(), &origin, &touched.coords) < required
         {
             rejections.hidden += 1;
             continue;

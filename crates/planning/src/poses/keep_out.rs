@@ -1,7 +1,8 @@
-//! Collision checks: links as capsules against a floor and boxes, at poses and along joint motions.
+//! Collision checks: links as capsules against a floor, boxes and the arm's own bodies, at poses and along joint motions.
 //!
 //! Links are capsules: the segments between the origins of neighbouring joint frames, to the flange and on to the touched
 //! point, with one radius, halved from the wrist on. The first of them, the column on the base, never moves and is excluded.
+//! Which of them the arm can run into itself, and at what distance, is in [`own_bodies`](super::own_bodies).
 //!
 //! A motion is checked continuously, not at sampled poses: a point of a link moves by no more than the sum over the joints of
 //! rotation times the largest distance of the link from the axis. One distance check therefore clears an interval of the
@@ -9,6 +10,8 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::cable::segment_distance;
+use super::own_bodies::{BODIES, FIRST_JOINT, Lines, OwnBodies};
 use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, PreparedModel};
@@ -20,10 +23,15 @@ pub struct KeepOut {
     pub floor_mm: Option<f64>,
     /// Forbidden boxes: lower and upper corner (mm).
     pub boxes_mm: Vec<[[f64; 3]; 2]>,
-    /// Radius of the links (mm).
+    /// Radius of the links (mm); 0 disables the check against the arm's own bodies.
     pub radius_mm: f64,
     /// Distance from a pose at which its approach begins, in every joint (rad).
     pub approach_rad: f64,
+}
+
+/// Whether an arm is clear of obstacles and of itself with these joints.
+pub fn is_clear(setup: &MeasurementSetup<'_>, space: &KeepOut, joints: &Joints) -> bool {
+    CollisionChecker::of(setup, space).pose_is_clear(joints)
 }
 
 /// Checks an arm against obstacles.
@@ -32,6 +40,7 @@ pub(super) struct CollisionChecker<'a> {
     space: &'a KeepOut,
     setup: &'a MeasurementSetup<'a>,
     arm: PreparedModel<'a>,
+    own: OwnBodies,
     /// Largest distance of the ends of the segments from the axis of each joint that moves them (mm).
     levers_mm: [[f64; 6]; ENDS],
 }
@@ -45,8 +54,9 @@ const FINEST_MM: f64 = 0.2;
 impl<'a> CollisionChecker<'a> {
     pub(super) fn of(setup: &'a MeasurementSetup<'a>, space: &'a KeepOut) -> Self {
         let arm = setup.nominal.at_condition(&Condition::default());
+        let own = OwnBodies::of(setup, &arm.frames(&Joints::zeros()));
         let levers_mm = [[0.0; 6]; ENDS];
-        let mut out = Self { space, setup, arm, levers_mm };
+        let mut out = Self { space, setup, arm, own, levers_mm };
         out.levers_mm = out.levers();
         out
     }
@@ -55,7 +65,7 @@ impl<'a> CollisionChecker<'a> {
     /// later ends are at most the sum of the link lengths in between farther away.
     fn levers(&self) -> [[f64; 6]; ENDS] {
         let still = Joints::zeros();
-        let (ends, frames) = (self.ends(&still), self.arm.frames(&still));
+        let (Shape { ends, .. }, frames) = (self.shape(&still), self.arm.frames(&still));
         let from_axis = |joint: usize, end: usize| {
             (ends[end] - ends[joint]).cross(&Vector3::from(frames.z[joint])).norm()
         };
@@ -76,38 +86,62 @@ impl<'a> CollisionChecker<'a> {
         })
     }
 
-    /// Whether there are obstacles.
+    /// Whether there is anything to run into.
     pub(super) fn is_active(&self) -> bool {
-        self.space.floor_mm.is_some() || !self.space.boxes_mm.is_empty()
+        self.space.floor_mm.is_some() || !self.space.boxes_mm.is_empty() || self.minds_itself()
     }
 
-    /// Base, ends of the links, flange and touched point (mm).
-    fn ends(&self, joints: &Joints) -> [Vector3<f64>; ENDS] {
+    /// The arm's own bodies.
+    pub(super) fn own(&self) -> &OwnBodies {
+        &self.own
+    }
+
+    /// Whether the arm's own bodies count.
+    fn minds_itself(&self) -> bool {
+        self.space.radius_mm > 0.0
+    }
+
+    /// Where the arm is.
+    fn shape(&self, joints: &Joints) -> Shape {
         let frames = self.arm.frames(joints);
         let flange = frames.last() * self.setup.nominal.flange;
         let touched = flange * Point3::from(self.setup.frames.flange_from_target.translation.vector);
-        std::array::from_fn(|end| match end {
+        let ends = std::array::from_fn(|end| match end {
             FLANGE => flange.translation.vector,
             TOUCHED => touched.coords,
             link => Vector3::from(frames.origin[link]),
+        });
+        Shape { ends, own: self.own.lines(&frames) }
+    }
+
+    /// Whether the arm is clear of obstacles and of itself with these joints.
+    pub(super) fn pose_is_clear(&self, joints: &Joints) -> bool {
+        !self.is_active() || self.has_clearance(&self.shape(joints), &Moved::default())
+    }
+
+    /// Whether all moving links have a clearance of their radius plus the motion of their ends.
+    fn has_clearance(&self, shape: &Shape, moved: &Moved) -> bool {
+        (1..ENDS - 1).all(|segment| {
+            let (a, b) = (&shape.ends[segment], &shape.ends[segment + 1]);
+            let radius = self.space.radius_mm * if segment < WRIST { 1.0 } else { 0.5 };
+            // A point between two ends moves no more than the end that moves most.
+            let room = radius + moved.most(segment);
+            // Only the far end: the near end of the first segment is the fixed column's.
+            let above =
+                self.space.floor_mm.is_none_or(|floor| b.z - radius - moved.in_base_mm[segment + 1] >= floor);
+            above
+                && self.space.boxes_mm.iter().all(|corners| keeps_off(a, b, corners, room))
+                && (!self.minds_itself() || self.keeps_off_itself(segment, shape, moved))
         })
     }
 
-    /// Whether the arm is clear of obstacles with these joints.
-    pub(super) fn pose_is_clear(&self, joints: &Joints) -> bool {
-        !self.is_active() || self.has_clearance(&self.ends(joints), &[0.0; ENDS])
-    }
-
-    /// Whether all moving links have a clearance of their radius plus the motion of their ends (mm).
-    fn has_clearance(&self, ends: &[Vector3<f64>; ENDS], moved_mm: &[f64; ENDS]) -> bool {
-        (1..ENDS - 1).all(|segment| {
-            let (a, b) = (&ends[segment], &ends[segment + 1]);
-            let radius = self.space.radius_mm * if segment < WRIST { 1.0 } else { 0.5 };
-            // A point between two ends moves no more than the end that moves most.
-            let room = radius + moved_mm[segment].max(moved_mm[segment + 1]);
-            // Only the far end: the near end of the first segment is the fixed column's.
-            let above = self.space.floor_mm.is_none_or(|floor| b.z - radius - moved_mm[segment + 1] >= floor);
-            above && self.space.boxes_mm.iter().all(|corners| keeps_off(a, b, corners, room))
+    /// Whether a segment keeps off the arm's own bodies.
+    fn keeps_off_itself(&self, segment: usize, shape: &Shape, moved: &Moved) -> bool {
+        let (a, b) = (&shape.ends[segment], &shape.ends[segment + 1]);
+        (0..BODIES).all(|body| {
+            let Some(room) = self.own.room_mm(body, segment, self.space.radius_mm) else { return true };
+            let room = room + moved.most_against(body, segment);
+            shape.own[body].iter().all(|[from, to]| segment_distance(a, b, from, to) >= room)
         })
     }
 
@@ -117,20 +151,25 @@ impl<'a> CollisionChecker<'a> {
             return true;
         }
         let turns = self.setup.nominal.mapped(&(to - from)).0;
-        let moved =
-            |levers: &[f64; 6]| levers.iter().zip(&turns).map(|(lever, turn)| lever * turn.abs()).sum();
-        self.interval_is_clear(from, to, &self.levers_mm.each_ref().map(moved))
+        let since = |first: usize| {
+            self.levers_mm.each_ref().map(|levers| {
+                let pairs = levers.iter().zip(&turns).skip(first);
+                pairs.map(|(lever, turn)| lever * turn.abs()).sum()
+            })
+        };
+        let moved = Moved { in_base_mm: since(0), against_mm: FIRST_JOINT.map(since) };
+        self.interval_is_clear(from, to, &moved)
     }
 
-    /// The same for an interval in which the ends of the segments move by no more than `moved_mm`.
-    fn interval_is_clear(&self, from: &Joints, to: &Joints, moved_mm: &[f64; ENDS]) -> bool {
+    /// The same for an interval in which the ends of the segments move by no more than `moved`.
+    fn interval_is_clear(&self, from: &Joints, to: &Joints, moved: &Moved) -> bool {
         let middle = from.lerp(to, 0.5);
-        let (ends, half) = (self.ends(&middle), moved_mm.map(|moved| 0.5 * moved));
-        if self.has_clearance(&ends, &half) {
+        let (shape, half) = (self.shape(&middle), moved.half());
+        if self.has_clearance(&shape, &half) {
             return true;
         }
-        half.iter().any(|half| *half > FINEST_MM)
-            && self.has_clearance(&ends, &[0.0; ENDS])
+        half.in_base_mm.iter().any(|half| *half > FINEST_MM)
+            && self.has_clearance(&shape, &Moved::default())
             && self.interval_is_clear(from, &middle, &half)
             && self.interval_is_clear(&middle, to, &half)
     }
@@ -176,6 +215,34 @@ impl<'a> CollisionChecker<'a> {
         let found =
             pairs.into_iter().take(MOST_PAIRS).find(|(first, second)| self.motion_is_clear(first, second));
         found.map(|(first, second)| vec![*first, *second])
+    }
+}
+
+/// Ends of the segments, and the arm's own bodies (mm, base).
+struct Shape {
+    ends: [Vector3<f64>; ENDS],
+    own: Lines,
+}
+
+/// How far the ends of the segments move at most: in the base, and against each of the arm's own bodies (mm).
+#[derive(Default)]
+struct Moved {
+    in_base_mm: [f64; ENDS],
+    against_mm: [[f64; ENDS]; BODIES],
+}
+
+impl Moved {
+    fn most(&self, segment: usize) -> f64 {
+        self.in_base_mm[segment].max(self.in_base_mm[segment + 1])
+    }
+
+    fn most_against(&self, body: usize, segment: usize) -> f64 {
+        self.against_mm[body][segment].max(self.against_mm[body][segment + 1])
+    }
+
+    fn half(&self) -> Self {
+        let half = |moved: [f64; ENDS]| moved.map(|moved| 0.5 * moved);
+        Self { in_base_mm: half(self.in_base_mm), against_mm: self.against_mm.map(half) }
     }
 }
 

@@ -131,10 +131,16 @@ pub fn checked(plan: &Plan) -> String {
         count => format!("out of the {count} boxes"),
     };
     let floor = space.floor_mm.map_or(String::new(), |floor| format!("above z = {floor} mm"));
-    let and = if floor.is_empty() || boxes.is_empty() { "" } else { " and " };
-    if floor.is_empty() && boxes.is_empty() {
-        return "not where the arm is in the cell".to_owned();
-    }
+    let itself = match space.radius_mm > 0.0 {
+        true => "off the arm's own column, upper arm and forearm".to_owned(),
+        false => String::new(),
+    };
+    let parts: Vec<String> = [floor, boxes, itself].into_iter().filter(|part| !part.is_empty()).collect();
+    let stay = match parts.as_slice() {
+        [] => return "not where the arm is in the cell".to_owned(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    };
     let stops: usize = plan.rows.iter().map(|row| row.waypoints.len()).sum();
     let stop_note = match stops {
         0 => String::new(),
@@ -142,7 +148,8 @@ pub fn checked(plan: &Plan) -> String {
         stops => format!(", with {stops} stops on the way"),
     };
     format!(
-        "links (as capsules of {:.0} mm radius) and target stay {floor}{and}{boxes} at every pose and on every way between them{stop_note}",
+        "links (as capsules of {:.0} mm radius along the lines between the joints, from the forearm on half of it against the arm itself; no \
+         covers, cables or hoses) and target stay {stay} at every pose and on every way between them{stop_note}",
         space.radius_mm
     )
 }

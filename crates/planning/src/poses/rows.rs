@@ -143,8 +143,8 @@ impl ReadingJacobian {
         finite.then(|| DMatrix::from_fn(p, p, |i, j| inverse[(i, j)] * self.scale[i] * self.scale[j]))
     }
 
-    /// Predicted standard deviation of the lengths of some rows under the fitted parameters, root mean square, in units of
-    /// the noise: √ mean xᵀ M⁻¹ x. `None` if M is not positive definite.
+    /// Predicted standard deviation of each length or coordinate of some rows under the fitted parameters, root mean square, in units of
+    /// the noise, which is stated for each, too: √ mean xᵀ M⁻¹ x. `None` if M is not positive definite.
     pub fn reading_sigma(&self, information: &DMatrix<f64>, rows: &[usize]) -> Option<f64> {
         let factor = Cholesky::new(information.clone())?;
         // Only the three coordinates of a pose, not its angles.
@@ -156,7 +156,7 @@ impl ReadingJacobian {
                 x.component_mul(&factor.solve(&x)).sum()
             })
             .sum();
-        Some((sum / rows.len().max(1) as f64).sqrt())
+        Some((sum / (rows.len() * lengths).max(1) as f64).sqrt())
     }
 
     /// Standard deviation of every parameter after all rows are measured.

@@ -15,9 +15,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::blank::blank_row;
-use super::cable::clearance_mm;
-use super::candidate::{Bounds, Candidate, FREE_MM, sensor_mm};
+use super::cable::clearance_of_arm_mm;
+use super::candidate::{Bounds, Candidate, sensor_mm};
 use super::keep_out::CollisionChecker;
+use super::own_bodies::OwnBodies;
 use super::questions::{Question, any_about};
 use super::roadmap::Roadmap;
 use super::setup::MeasurementSetup;
@@ -244,6 +245,7 @@ fn clear(setup: &MeasurementSetup<'_>, bounds: &Bounds, from: &Joints, to: &Join
         return true;
     }
     let posed = setup.nominal.at_condition(&Condition::default());
+    let own = OwnBodies::of(setup, &posed.frames(&Joints::zeros()));
     let origin = sensor_mm(setup.sensor, setup.frames, anchor);
     (0..=ON_THE_WAY).all(|k| {
         let joints = from.lerp(to, k as f64 / ON_THE_WAY as f64);
@@ -254,7 +256,7 @@ fn clear(setup: &MeasurementSetup<'_>, bounds: &Bounds, from: &Joints, to: &Join
         bounds.distance_mm.is_none_or(|[low, high]| (low..=high).contains(&distance))
             && bounds
                 .clearance_mm
-                .is_none_or(|least| clearance_mm(&frames, &origin, &touched.coords, FREE_MM) >= least)
+                .is_none_or(|least| clearance_of_arm_mm(&frames, &own, &origin, &touched.coords) >= least)
     })
 }
 

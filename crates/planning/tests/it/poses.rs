@@ -19,6 +19,7 @@ use truegrind_estimation::least_squares::lm;
 use truegrind_planning::poses::cable::{clearance_mm, segment_distance};
 use truegrind_planning::poses::candidate::{Bounds, draw};
 use truegrind_planning::poses::design::{Design, Index};
+use truegrind_planning::poses::keep_out::{KeepOut, is_clear};
 use truegrind_planning::poses::program::{ProgramSettings, draft};
 use truegrind_planning::poses::questions::{CandidateCause, DiagnosisFileError, effects_of, open, questions};
 use truegrind_planning::poses::rows::{Noise, ReadingJacobian, rig};
@@ -379,6 +380,110 @@ fn thin_sheets_are_not_passed_between_two_looks() {
     assert!(away >= 0.0, "{away} mm");
 }
 
+/// The class: a σ that is stated for each coordinate and predicted for the length of all three.
+#[test]
+fn the_predicted_sigma_is_that_of_each_coordinate() {
+    let jacobian = ReadingJacobian {
+        readings: DMatrix::identity(3, 3),
+        per_row: 3,
+        parameters: Vec::new(),
+        scale: vec![1.0; 3],
+        interest: Vec::new(),
+    };
+    let sigma = jacobian.reading_sigma(&DMatrix::identity(3, 3), &[0]).unwrap();
+    assert!((sigma - 1.0).abs() < 1e-12, "{sigma}");
+}
+
+/// The class: poses, and motions between them, at which the flange or the target is inside the arm's own column, upper arm or forearm.
+#[test]
+fn no_pose_and_no_motion_runs_into_the_arm_itself() {
+    for (robot, seed) in
+        [("abb-irb-120", 0), ("abb-irb-120", 5), ("kuka-kr10-r1420", 4), ("universal-robots-ur10", 1)]
+    {
+        let nominal = truegrind_arm::robots::load(robot).unwrap().model;
+        let mut frames = tracker();
+        frames.flange_from_target.translation.vector = Vector3::new(38.0, 12.0, 61.0);
+        let setup = MeasurementSetup { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
+        let reach: f64 = nominal.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum();
+        let mut options = Options { poses: 40, candidates: 400, seed, ..Options::default() };
+        options.bounds.space.radius_mm = reach / 12.0;
+        options.bounds.space.approach_rad = options.visits.approach_rad;
+        options.bounds.space.floor_mm = Some(0.0);
+        let found = plan(&setup, &options).unwrap();
+        let least = least_over(&found, |joints| share_of_own_bodies(&setup, joints, reach / 12.0));
+        assert!(least >= 1.0 - 1e-6, "{robot}, seed {seed}: {least} of the distance");
+        let stops: usize = found.rows.iter().map(|row| row.waypoints.len()).sum();
+        assert!(stops > 0, "{robot}, seed {seed}: straight motions alone would run into the arm");
+    }
+}
+
+/// How near flange and target come to the arm's own column, upper arm and forearm, as a share of the distance that they have to keep:
+/// by points, on lines that this test puts together itself.
+fn share_of_own_bodies(setup: &MeasurementSetup<'_>, joints: &Joints, radius_mm: f64) -> f64 {
+    let MeasurementSetup { nominal, frames, .. } = *setup;
+    let chain = nominal.at_condition(&Condition::default()).frames(joints);
+    let at = |k: usize| Vector3::from(chain.origin[k]);
+    let flange = nominal.forward(joints, &Condition::default());
+    let target = (flange * nalgebra::Point3::from(frames.flange_from_target.translation.vector)).coords;
+    let flange = flange.translation.vector;
+    let bent = 0.7 * (flange - at(4)).norm();
+    let bodies = [
+        (Vector3::zeros(), Vector3::new(0.0, 0.0, at(1).z), 1.5 * radius_mm),
+        (at(1), at(2), radius_mm),
+        (at(2), at(3), radius_mm.min(bent)),
+    ];
+    let near = |point: Vector3<f64>, (from, to, room): &(Vector3<f64>, Vector3<f64>, f64)| {
+        segment_distance(&point, &point, from, to) / room
+    };
+    let points = (0..=4).map(|k| flange.lerp(&target, f64::from(k) / 4.0));
+    points.flat_map(|point| bodies.iter().map(move |body| near(point, body))).fold(f64::INFINITY, f64::min)
+}
+
+/// Poses that arms are known to take: none may be lost for a collision of the arm with itself.
+#[test]
+fn published_poses_and_usual_home_poses_are_no_collision() {
+    let homes: [(&str, [f64; 6]); 12] = [
+        ("kuka-kr10-r1420", [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
+        ("kuka-kr10-r1420", [0.0, -90.0, 90.0, 0.0, 90.0, 0.0]),
+        // Folded for transport.
+        ("kuka-kr10-r1420", [0.0, -105.0, 156.0, 0.0, 0.0, 0.0]),
+        ("kuka-kr6-r900-sixx", [0.0, -105.0, 156.0, 0.0, 0.0, 0.0]),
+        ("abb-irb-120", [0.0, 0.0, 0.0, 0.0, 90.0, 0.0]),
+        ("abb-irb-120", [0.0, -50.0, 40.0, 0.0, 30.0, 0.0]),
+        ("abb-irb-4600-60-2.05", [0.0, -40.0, 50.0, 0.0, 60.0, 0.0]),
+        ("staubli-tx60", [0.0, 0.0, 90.0, 0.0, 90.0, 0.0]),
+        ("universal-robots-ur10", [0.0, -90.0, 90.0, -90.0, -90.0, 0.0]),
+        ("universal-robots-ur10", [0.0, -90.0, 0.0, -90.0, 0.0, 0.0]),
+        ("universal-robots-ur5", [0.0, -120.0, 140.0, -110.0, -90.0, 0.0]),
+        // Folded, the flange away from the upper arm.
+        ("universal-robots-ur5", [0.0, -45.0, 150.0, -15.0, 90.0, 0.0]),
+    ];
+    let published = truegrind_arm::robots::catalogue().into_iter().flat_map(|name| {
+        let robot = truegrind_arm::robots::load(&name).unwrap();
+        // Examples of a calculation sheet, which no arm took: the elbow of one is 335 mm below the mounting plane.
+        let taken =
+            robot.sheet.published.into_iter().filter(|pose| !pose.source.contains("calculation sheet"));
+        let poses = taken.map(|pose| pose.joints_deg);
+        poses.map(|joints| (name.clone(), joints)).collect::<Vec<_>>()
+    });
+    let homes = homes.into_iter().map(|(name, joints)| (name.to_owned(), joints));
+    let mut lost = Vec::new();
+    let mut count = 0;
+    for (name, joints) in published.chain(homes) {
+        let nominal = truegrind_arm::robots::load(&name).unwrap().model;
+        let mut frames = Frames::at_origin(1);
+        frames.flange_from_target.translation.vector = Vector3::new(0.0, 0.0, 40.0);
+        let setup = MeasurementSetup { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
+        let reach: f64 = nominal.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum();
+        let space = KeepOut { radius_mm: reach / 12.0, ..KeepOut::default() };
+        count += 1;
+        if !is_clear(&setup, &space, &Joints::from(joints.map(f64::to_radians))) {
+            lost.push((name, joints));
+        }
+    }
+    assert!(lost.is_empty() && count > 40, "{} of {count}: {lost:?}", lost.len());
+}
+
 /// How far the links stay from boxes beyond their radius on all ways of a plan (mm), looked at elsewhere than the plan looks.
 fn least_on_the_way(
     setup: &MeasurementSetup<'_>,
@@ -386,6 +491,11 @@ fn least_on_the_way(
     boxes: &[[[f64; 3]; 2]],
     radius_mm: f64,
 ) -> f64 {
+    least_over(found, |joints| least_away(setup, joints, boxes, radius_mm))
+}
+
+/// The least value over all motions of a plan.
+fn least_over(found: &Plan, value: impl Fn(&Joints) -> f64) -> f64 {
     let mut least = f64::INFINITY;
     for k in 1..found.rows.len() {
         let row = &found.rows[k];
@@ -396,8 +506,7 @@ fn least_on_the_way(
             .collect();
         for way in places.windows(2) {
             for share in (0..=150).map(|k| f64::from(k) / 150.0) {
-                let joints = way[0].lerp(&way[1], share);
-                least = least.min(least_away(setup, &joints, boxes, radius_mm));
+                least = least.min(value(&way[0].lerp(&way[1], share)));
             }
         }
     }

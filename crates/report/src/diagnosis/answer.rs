@@ -39,10 +39,10 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
         Some(floor) if diagnosis.is_noise_measured() => format!("noise floor {floor:.3} mm"),
         // The rounding of the log is no noise of the sensor.
         Some(floor) if floor < SHOWN_MM => {
-            "the noise floor is unknown, since too few poses were repeated".to_owned()
+            "the noise floor is unknown, since too few poses were repeated from the same sides".to_owned()
         }
         Some(floor) => format!(
-            "the rounding of the log alone makes {floor:.3} mm, the noise of the sensor is unknown, since too few poses were repeated"
+            "the rounding of the log alone makes {floor:.3} mm, the noise of the sensor is unknown, since too few poses were repeated from the same sides"
         ),
         None => format!("the noise floor is unknown, since {}", diagnosis.noise_floor_source),
     };
