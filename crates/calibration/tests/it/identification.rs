@@ -4,5 +4,6 @@ mod beyond_noise;
 mod calibration;
 mod prior_width;
 mod promise;
+mod stated_frame;
 pub(crate) mod unseen_target;
 mod verdict;
