@@ -16,11 +16,12 @@
 
 use nalgebra::{DMatrix, DVector, Point3, UnitQuaternion, Vector3, Vector6};
 
-use super::benefit::{mean_reading, widen_by_scale};
+use super::benefit::widen_by_scale;
 use super::calibration::Frames;
 use super::fit::{Fitted, Observations, errors_on};
 use super::identify::{Options, identify};
 use super::rounding::logged_covariance;
+use super::sensor_laws::mean_reading;
 use super::start::unseen_target;
 use super::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};

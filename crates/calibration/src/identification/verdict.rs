@@ -5,8 +5,9 @@
 //! explains the readings as well as the links, or there are too few rows for their noise. A doubtful model is written only on
 //! request, and every use of it says so.
 
-use crate::identification::benefit::{Benefit, ScaleError};
+use crate::identification::benefit::{Benefit, LawError, ScaleError};
 use crate::identification::beyond_noise::BeyondNoise;
+use crate::identification::sensor_laws::SensorLaw;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Sensor;
 use truegrind_arm::estimated::{EstimatedParameter, Judgement, Verdict};
@@ -140,6 +141,13 @@ impl VerdictBuilder {
             return;
         }
         self.doubt(sentence);
+        // With the sensor's further error out of the question all would be well.
+        let is_to_blame =
+            |law: &&LawError| law.benefit_without.is_none_or(|without| without >= MIN_PROBABILITY);
+        if let Some(law) = found.law.as_ref().filter(is_to_blame) {
+            self.doubt(law_sentence(law));
+            return;
+        }
         if found.probability_without_scale < MIN_PROBABILITY {
             self.doubt(too_few_rows(found));
             return;
@@ -273,6 +281,36 @@ fn scale_sentence(scale: &ScaleError, sensor: Sensor) -> String {
         percent_of(scale.probability),
         remedy(sensor)
     )
+}
+
+/// That the poses do not tell the arm from a further error of the sensor, and what to measure.
+fn law_sentence(law: &LawError) -> String {
+    let (error, remedy) = match law.kind {
+        SensorLaw::Pulley => (
+            "a cable that runs over a pulley at its outlet, of a radius of some 10 mm,",
+            "measure poses that turn the cable more widely about its outlet, best random ones all over the ranges of the joints, or some more with \
+             the outlet elsewhere; a cable that leaves its sensor through a small hole has no such error",
+        ),
+        SensorLaw::Drum => (
+            "a cable whose length is wound on in layers",
+            "measure poses at more directions of the cable for each of its lengths, best random ones all over the ranges of the joints, and the \
+             sensor itself against a known length",
+        ),
+        SensorLaw::Radial => (
+            "a camera with a radial distortion, of some 0.2 % at the edge,",
+            "measure poses all over the ranges of the joints, not in one box in front of the camera, or from a second place of the camera, and \
+             calibrate its lens",
+        ),
+    };
+    let explains = if law.probability > FOUND {
+        format!("{error} explains these readings better than the arm alone")
+    } else {
+        format!("these poses do not tell the arm from its sensor: {error} would read much the same")
+    };
+    let helps = law.benefit_with.map_or_else(String::new, |with| {
+        format!(", and with it the model improves programs with a probability of {} only", percent_of(with))
+    });
+    format!("{explains} (probability {}){helps}: {remedy}", percent_of(law.probability))
 }
 
 fn remedy(sensor: Sensor) -> &'static str {
