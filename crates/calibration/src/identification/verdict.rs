@@ -41,6 +41,8 @@ pub struct VerdictBuilder {
     failures: Vec<String>,
     doubts: Vec<String>,
     others: Vec<String>,
+    /// Which of these is the expected benefit.
+    benefit: Option<usize>,
     limits_stated: bool,
 }
 
@@ -133,6 +135,7 @@ impl VerdictBuilder {
         };
         let sentence = benefit_sentence(found);
         if found.probability >= MIN_PROBABILITY {
+            self.benefit = Some(self.others.len());
             self.note(sentence);
             match &found.scale {
                 Some(scale) if spoils(scale) => self.doubt(scale_sentence(scale, sensor)),
@@ -173,6 +176,12 @@ impl VerdictBuilder {
         };
         let mut reasons = std::mem::take(&mut self.failures);
         reasons.append(&mut self.doubts);
+        // What speaks against the model is not in its expected benefit.
+        if status == Judgement::Fail
+            && let Some(benefit) = self.benefit.and_then(|k| self.others.get_mut(k))
+        {
+            benefit.insert_str(0, "if what is said above were not so: ");
+        }
         reasons.append(&mut self.others);
         Verdict { status, reasons }
     }
