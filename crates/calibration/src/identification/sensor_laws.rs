@@ -5,9 +5,6 @@
 //!   pulley of radius r that swivels about the vertical makes the cable longer by r (ε − cos ε), beside a constant and terms of the order
 //!   r²/d; one that is held otherwise, or guides, by second-degree harmonics of u.
 //! - A cable wound in layers: second and third degree of its length.
-//! - A camera: with ρ the place across its axis in units of the RMS of all, a radial distortion of third degree, ρ |ρ|², about a centre
-//!   that may lie elsewhere than at the mean of the readings: its derivatives 2 ρ ρᵀ + |ρ|². Only of a sensor that reads orientations: one
-//!   of positions alone is taken to be a tracker, which has no such error.
 //!
 //! None of these widths is stated by the user: they are the sizes that such parts have.
 
@@ -26,24 +23,19 @@ pub enum SensorLaw {
     Pulley,
     /// A cable wound in layers.
     Drum,
-    /// The radial distortion of a camera.
-    Radial,
 }
 
 /// Standard deviation of the radius of a pulley (mm).
 const PULLEY_MM: f64 = 10.0;
 /// Of the other harmonics of a cable's direction, and of the degrees of its length (mm).
 const HARMONIC_MM: f64 = 0.5;
-/// Displacement by a radial distortion at the RMS distance from the axis, as a share of that distance: half a pixel in some 500.
-const RADIAL: f64 = 2e-3;
 
 impl SensorLaw {
     /// The laws that a sensor may have.
     pub(super) fn of(sensor: Sensor) -> &'static [SensorLaw] {
         match sensor {
             Sensor::Cable => &[SensorLaw::Pulley, SensorLaw::Drum],
-            Sensor::Pose => &[SensorLaw::Radial],
-            Sensor::Position => &[],
+            Sensor::Position | Sensor::Pose => &[],
         }
     }
 
@@ -52,7 +44,6 @@ impl SensorLaw {
         match self {
             SensorLaw::Pulley => 0.2,
             SensorLaw::Drum => 0.1,
-            SensorLaw::Radial => 0.2,
         }
     }
 }
@@ -72,7 +63,6 @@ impl<'a> SensorErrors<'a> {
         match law {
             SensorLaw::Pulley => Self { law, count: 6, at: pulley(fitted, dataset) },
             SensorLaw::Drum => Self { law, count: 2, at: drum(dataset) },
-            SensorLaw::Radial => Self { law, count: 3, at: radial(fitted, dataset) },
         }
     }
 
@@ -111,27 +101,6 @@ fn drum(dataset: &Dataset) -> ErrorsAt<'_> {
     Box::new(move |row| {
         let t = (2.0 * dataset.rows[row].reading.place_mm().x - low - high) / (high - low).max(1.0);
         lengths(&[0.5 * (3.0 * t * t - 1.0), 0.5 * (5.0 * t * t * t - 3.0 * t)].map(|v| HARMONIC_MM * v))
-    })
-}
-
-fn radial<'a>(fitted: &'a Fitted, dataset: &'a Dataset) -> ErrorsAt<'a> {
-    let count = dataset.rows.len().max(1) as f64;
-    let mean = mean_reading(dataset);
-    let axis = mean.try_normalize(1.0).unwrap_or_else(Vector3::z);
-    let across = move |row: usize| {
-        let place = dataset.rows[row].reading.place_mm() - mean;
-        place - axis * axis.dot(&place)
-    };
-    let square = (0..dataset.rows.len()).map(|row| across(row).norm_squared()).sum::<f64>() / count;
-    let size_mm = square.sqrt().max(1e-9);
-    let first = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
-    let sides = [first, axis.cross(&first)];
-    let to_base = fitted.frames.base_from_sensor.rotation;
-    Box::new(move |row| {
-        let place = across(row) / size_mm;
-        let square = place.norm_squared();
-        let [first, second] = sides.map(|side| 2.0 * place * place.dot(&side) + side * square);
-        [place * square, first, second].map(|error| to_base * error * (RADIAL * size_mm)).to_vec()
     })
 }
 

@@ -305,11 +305,6 @@ fn law_sentence(law: &LawError) -> String {
             "measure poses at more directions of the cable for each of its lengths, best random ones all over the ranges of the joints, and the \
              sensor itself against a known length",
         ),
-        SensorLaw::Radial => (
-            "a camera with a radial distortion, of some 0.2 % at the edge,",
-            "measure poses all over the ranges of the joints, not in one box in front of the camera, or from a second place of the camera, and \
-             calibrate its lens",
-        ),
     };
     let explains = if law.probability > FOUND {
         format!("{error} explains these readings better than the arm alone")
