@@ -5,6 +5,7 @@ use std::sync::Arc;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use truegrind::calibration::diagnosis::transfer::new_rows;
 use truegrind::calibration::identification::verdict::Limits;
 use truegrind::math::work::report_step;
 use truegrind::report::{diagnosis, format, identification};
@@ -360,6 +361,7 @@ pub(crate) fn diagnose_(
         let mut found = diagnose(&rows, name, nominal, &frames, &options, &|step| report_step(step))?;
         for other in others {
             let other = other.of(&robot, angles)?;
+            let Some(other) = new_rows(&rows, &other, &mut found.diagnosis.notes) else { continue };
             report_step(&format!("judging on {}", other.file));
             let frames = starting_frames(&other, nominal, &options.tolerance, options.fuse_readout)?;
             found.test_on(&other, &frames, &options.tolerance, options.fuse_readout);

@@ -7,6 +7,7 @@ use clap::Args;
 use truegrind::ErrorSummary;
 use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
+use truegrind::calibration::diagnosis::transfer::new_rows;
 use truegrind::calibration::identification::calibration::Frames;
 use truegrind::calibration::identification::fit::summary_on;
 use truegrind::calibration::identification::identify::prepare_observations;
@@ -167,9 +168,10 @@ pub(super) fn diagnose_rows(
         ));
     }
     for other in others {
+        let Some(other) = new_rows(dataset, other, &mut found.diagnosis.notes) else { continue };
         report_step(&format!("testing on {}", other.file));
-        let frames = starting_frames(other, nominal, &options.tolerance, options.fuse_readout)?;
-        found.test_on(other, &frames, &options.tolerance, options.fuse_readout);
+        let frames = starting_frames(&other, nominal, &options.tolerance, options.fuse_readout)?;
+        found.test_on(&other, &frames, &options.tolerance, options.fuse_readout);
     }
     Ok(found)
 }

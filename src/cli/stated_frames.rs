@@ -5,14 +5,12 @@ use clap::Args;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use truegrind::arm::model::Model;
 use truegrind::calibration::identification::calibration::Frames;
-use truegrind::calibration::identification::identify::{Options, identify};
 use truegrind::calibration::identification::stated_frame::{
-    beside, contradicted_target, contradiction, contradiction_beside_geometry, tolerance_beside,
+    beside, contradicted_target, contradiction, contradiction_beside_geometry, judged_by_fit,
     with_touched_point,
 };
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
-use truegrind::calibration::measurement::split;
 use truegrind::math::se3::Pose;
 
 /// Pose of the sensor, if known. Without [`FramePriorArguments`] it serves for the raw error only, and the fit determines the
@@ -77,10 +75,16 @@ impl FramePriorArguments {
             bail!("{contradiction}");
         }
         let Some(text) = &self.frame_sigma else {
-            if let Some(contradiction) =
-                stated.and_then(|stated| contradiction(dataset, nominal, stated, &found, 0.0))
+            if let Some(stated) = stated
+                && let Some(contradiction) = contradiction(dataset, nominal, stated, &found, 0.0)
             {
-                bail!("{contradiction}");
+                let sigma = [UNSTATED_MM, UNSTATED_MM * 1e-3];
+                let stated = Frames { flange_from_target: target(touched, &found), ..stated.clone() };
+                let (judged, _) =
+                    judged_by_fit([&tolerance, of_arm], (&stated, &found), sigma, (dataset, nominal));
+                if judged != Some(None) {
+                    bail!("{contradiction}");
+                }
             }
             let begins_there = stated.is_none() || self.touched_sigma.is_some();
             let frames = match touched.filter(|_| begins_there) {
@@ -100,29 +104,39 @@ impl FramePriorArguments {
         if !(mm > 0.0 && deg > 0.0) {
             bail!("--frame-sigma {text}: expected numbers above 0");
         }
-        if let Some(contradiction) = contradiction(dataset, nominal, stated, &found, mm) {
-            bail!("{contradiction}");
-        }
-        // Where this fit fails, the one that is asked for says why.
-        let of_arm = Tolerance { target_mm: tolerance.target_mm, ..*of_arm };
-        let of_arm = tolerance_beside(dataset, nominal, &of_arm);
-        let free = Options { tolerance: of_arm, ..Options::default() };
-        let split = |rows: &Dataset| split::random(rows, free.held_out, free.seed);
-        let geometry = identify(dataset, "", nominal, &found, &split, &free).map(|free| free.geometry);
-        if let Ok(geometry) = geometry
-            && let Some(contradiction) =
-                contradiction_beside_geometry(dataset, geometry, stated, [mm, deg.to_radians()], of_arm.scale)
+        let sigma = [mm, deg.to_radians()];
+        let frames = Frames { flange_from_target: target(touched, &found), ..stated.clone() };
+        let (judged, geometry) =
+            judged_by_fit([&tolerance, of_arm], (&frames, &found), sigma, (dataset, nominal));
+        // The arm of the data sheet alone refuses nothing, but may say what is wrong with the frame.
+        let beside_nominal = contradiction(dataset, nominal, stated, &found, mm);
+        if judged != Some(None)
+            && let Some(contradiction) = beside_nominal
         {
             bail!("{contradiction}");
         }
-        let flange_from_target = if stated.flange_from_target == Pose::identity() {
-            found.flange_from_target
-        } else {
-            stated.flange_from_target
-        };
-        let tolerance = Tolerance { frame_mm: mm, frame_rad: deg.to_radians(), ..tolerance };
-        Ok((tolerance, Frames { flange_from_target, ..stated.clone() }))
+        if let Some(geometry) = geometry
+            && let Some(contradiction) =
+                contradiction_beside_geometry(dataset, geometry, stated, sigma, of_arm.scale)
+        {
+            bail!("{contradiction}");
+        }
+        if let Some(Some(contradiction)) = judged {
+            bail!("{contradiction}");
+        }
+        Ok((Tolerance { frame_mm: mm, frame_rad: deg.to_radians(), ..tolerance }, frames))
     }
+}
+
+/// Uncertainty of a frame whose own is not stated, to judge it (mm).
+const UNSTATED_MM: f64 = 0.5;
+
+/// The target on the flange: where it was touched, turned as the readings say where no rotation was stated; otherwise where they put it.
+fn target(touched: Option<Pose>, found: &Frames) -> Pose {
+    let Some(touched) = touched else { return found.flange_from_target };
+    let is_turned = touched.rotation != UnitQuaternion::identity();
+    let rotation = if is_turned { touched.rotation } else { found.flange_from_target.rotation };
+    Pose::from_parts(touched.translation, rotation)
 }
 
 /// What is stated of sensor and target.

@@ -503,7 +503,11 @@ fn diagnose_names_what_was_hidden_and_compensate_uses_it() {
     let dir = folder();
     let at = dir.path();
     fs::write(at.join("data.csv"), include_str!("../data/irb120-tracker.csv")).unwrap();
-    fs::write(at.join("cable.csv"), CABLE).unwrap();
+    // The same arm, measured again. (The shipped cable measured another one, which `--also` tells.)
+    let recipe = include_str!("../data/irb120-tracker.toml").replace("\nseed = 121\n", "\nseed = 122\n");
+    fs::write(at.join("recipe.toml"), recipe).unwrap();
+    let (code, _, err) = truegrind(at, &["simulate", "recipe.toml", "-o", "again.csv"]);
+    assert_eq!(code, 0, "{err}");
     fs::write(at.join("blade.toml"), include_str!("../../surfaces/blade.toml")).unwrap();
     let (code, out, err) = truegrind(
         at,
@@ -523,7 +527,7 @@ fn diagnose_names_what_was_hidden_and_compensate_uses_it() {
             "--csv",
             "why.csv",
             "--also",
-            "cable.csv",
+            "again.csv",
         ],
     );
     assert_eq!(code, 0, "{out}{err}");
@@ -545,7 +549,7 @@ fn diagnose_names_what_was_hidden_and_compensate_uses_it() {
     assert_eq!(found.len(), 4, "{found:?}");
     let error = |stage: &str| json["fits"][stage]["cv_rmse_mm"].as_f64().unwrap();
     assert!(error("extended") < 0.4 * error("geometric") && error("geometric") < 0.4 * error("nominal"));
-    assert_eq!(json["transfers"][0]["file"], "cable.csv");
+    assert_eq!(json["transfers"][0]["file"], "again.csv");
     for file in ["why.html", "why.md", "why.csv"] {
         let page = fs::read_to_string(at.join(file)).unwrap();
         assert!(page.contains("gear-eccentricity") || page.contains("Gear eccentricity"), "{file}");

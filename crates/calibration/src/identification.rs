@@ -14,6 +14,7 @@ pub mod start;
 mod sessions;
 pub(crate) mod placement;
 pub mod stated_frame;
+pub mod sensor_laws;
 pub mod benefit;
 pub mod beyond_noise;
 pub mod verdict;

@@ -134,6 +134,7 @@ pub fn diagnose(
     diagnosis.poses_needed = needed;
     let of_all = thin_rows.is_none().then_some(&confirmed.outcome.discrepancy);
     let certain_model = certain_model(&search, &certain, of_all);
+    let beside_sensor = certain_model.1;
     let ((written, written_stage), chance) = without_measurement_causes(&search, certain_model, of_all);
     let written = if written.causes.is_empty() {
         as_identified(&context, robot, &written, of_all).unwrap_or(written)
@@ -153,6 +154,7 @@ pub fn diagnose(
         discrepancy: of_all,
         scatter,
         noise: Noise { floor_mm: diagnosis.noise_floor_mm, beyond },
+        beside_sensor,
         few_poses,
     };
     let handed = with_uncertain_causes(&search, &written, of_all);
@@ -190,6 +192,9 @@ struct Handing<'a> {
     discrepancy: Option<&'a Discrepancy>,
     scatter: Option<JointScatter>,
     noise: Noise,
+    /// Errors of the written arm beside all causes of the measurement: what it lacks beyond the errors with all causes is the arm's, and
+    /// what a fit without the causes of the measurement lacks beyond that is not.
+    beside_sensor: StageError,
     /// Says that there are too few poses.
     few_poses: Option<String>,
 }
@@ -226,13 +231,11 @@ impl Handing<'_> {
         }
         let stages = [before, geometry, *stage];
         let few_poses = self.few_poses.as_deref();
-        let of_the_sensor = |fit: &Extended| fit.causes.iter().filter(|cause| !cause.is_in_arm()).count();
-        let [all, own] =
-            [&search.stages[2], stage].map(|s| StageErrors { fitted: s.fitted, held_out: s.random });
-        let lacks_of_arm = of_the_sensor(written) == of_the_sensor(&search.extended);
+        let [all, beside_sensor, own] = [&search.stages[2], &self.beside_sensor, stage]
+            .map(|s| StageErrors { fitted: s.fitted, held_out: s.random });
         let sensor = search.context.dataset.sensor;
-        let noise =
-            Noise { beyond: self.noise.beyond.of_part(&all, &own, sensor, lacks_of_arm), ..self.noise };
+        let of_arm = self.noise.beyond.of_part(&all, &beside_sensor, sensor, true);
+        let noise = Noise { beyond: of_arm.of_part(&beside_sensor, &own, sensor, false), ..self.noise };
         let scatter_mm = self.scatter.as_ref().map_or(0.0, JointScatter::rms_mm);
         estimated(search, robot, (&fits, missing, scatter_mm), &stages, (noise, few_poses))
     }

@@ -6,7 +6,8 @@
 //!
 //! - narrower priors and more noise: prior widths of lengths and angles and the sensor's σ run over grids, each grid point
 //!   weighted by its evidence (marginal likelihood);
-//! - each of these with a scale error of the sensor as a further parameter.
+//! - each of these with a scale error of the sensor as a further parameter;
+//! - and with a further error of the sensor ([`SensorLaw`]): a box of poses may not tell it from the arm's geometry.
 //!
 //! Let x̂ be the estimate and x the deviations of the actual arm. A point fixed to the flange is corrected by J x̂ where J x is
 //! required. The reduction of its squared error relative to the nominal arm is
@@ -34,6 +35,7 @@ use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::CalibrationProblem;
 use crate::identification::fit::{Fitted, Observations};
 use crate::identification::rounding;
+use crate::identification::sensor_laws::{SensorErrors, SensorLaw, mean_reading};
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::disturbance::{Kind, Profile};
@@ -70,6 +72,9 @@ pub struct Benefit {
     pub probability_without_scale: f64,
     /// The scale error under the models that have one; absent where the fit itself had a scale parameter.
     pub scale: Option<ScaleError>,
+    /// The further error of the sensor that explains the readings best; absent where a sensor has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law: Option<LawError>,
     /// Scalar readings.
     pub readings: usize,
     /// Parameters that the readings determine: Σ (1 − σ²/prior²).
@@ -114,11 +119,26 @@ pub struct ScaleError {
     pub nominal_mm: f64,
 }
 
+/// A further error of the sensor as an alternative explanation of the readings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LawError {
+    /// The likeliest one.
+    pub kind: SensorLaw,
+    /// Posterior probability of the models with any.
+    pub probability: f64,
+    /// Probability that the estimated arm is the better one if the sensor has no such error; absent where that is out of the question.
+    pub benefit_without: Option<f64>,
+    /// The same if it has one.
+    pub benefit_with: Option<f64>,
+}
+
 /// Grid of prior widths, as multiples of the tolerance.
 const LENGTH_WIDTHS: [f64; 6] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0];
 const ANGLE_WIDTHS: [f64; 7] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Grid of the sensor's σ, as a multiple of the fit's.
 const NOISE_FACTORS: [f64; 4] = [0.71, 1.0, 1.41, 2.0];
+/// Beside a further error of the sensor, which the fit may have counted as noise, it may be far smaller.
+const NOISE_FACTORS_BESIDE_LAW: [f64; 8] = [0.0625, 0.125, 0.25, 0.5, 0.71, 1.0, 1.41, 2.0];
 /// Above this number of parameters every second width is skipped and products run in blocks.
 const MANY: usize = 90;
 
@@ -138,6 +158,37 @@ struct ScalePrior {
     probability: f64,
 }
 
+/// What the sensor may have beside its noise.
+struct Alternative {
+    /// Standard deviation of its relative scale error; `None` for none.
+    scale: Option<f64>,
+    /// Its further error.
+    law: Option<SensorLaw>,
+    probability: f64,
+    /// Columns of the linearised readings that it has, beside those of the fit's parameters.
+    columns: Vec<usize>,
+}
+
+/// Each scale error alone, and each further error beside the scale error that is likeliest before any reading.
+fn alternatives(fitted: &Fitted, tolerance: &Tolerance, readings: &LinearisedReadings) -> Vec<Alternative> {
+    let scale = fitted.parameters.len();
+    let scale_priors = scale_priors(fitted, tolerance);
+    let any: f64 = readings.laws.iter().map(|(law, _)| law.probability()).sum();
+    let alone = scale_priors.iter().map(|prior| Alternative {
+        scale: prior.sigma,
+        law: None,
+        probability: (1.0 - any) * prior.probability,
+        columns: prior.sigma.map(|_| scale).into_iter().collect(),
+    });
+    let beside = readings.laws.iter().map(|(law, columns)| Alternative {
+        scale: scale_priors[0].sigma,
+        law: Some(*law),
+        probability: law.probability(),
+        columns: scale_priors[0].sigma.map(|_| scale).into_iter().chain(columns.clone()).collect(),
+    });
+    alone.chain(beside).collect()
+}
+
 /// Prior over the scale error: as stated, or none beside a scale that the fit has itself.
 fn scale_priors(fitted: &Fitted, tolerance: &Tolerance) -> Vec<ScalePrior> {
     let certain = |sigma: Option<f64>| vec![ScalePrior { sigma, probability: 1.0 }];
@@ -148,10 +199,12 @@ fn scale_priors(fitted: &Fitted, tolerance: &Tolerance) -> Vec<ScalePrior> {
     }
 }
 
-/// Normal equations of the readings in the parameters of the fit and a scale error of the sensor.
+/// Normal equations of the readings in the parameters of the fit, a scale error of the sensor and its further errors.
 struct LinearisedReadings {
-    /// JᵀJ, the scale error last.
+    /// JᵀJ, the scale error after the parameters, the further errors last.
     matrix: DMatrix<f64>,
+    /// Columns of each further error.
+    laws: Vec<(SensorLaw, Range<usize>)>,
     /// Jᵀy.
     right: DVector<f64>,
     /// yᵀy.
@@ -171,15 +224,15 @@ pub fn benefit(
     variance_inflation: f64,
 ) -> Option<Benefit> {
     let metric = shape_metric(fitted, &estimated.condition, &estimated.region.samples_deg)?;
-    let mut readings = linearise_readings(fitted, dataset);
+    let mut readings = linearise_readings(fitted, dataset, SensorLaw::of(dataset.sensor));
     readings.project_scale_onto_arm(fitted, tolerance)?;
     let x = DVector::from_column_slice(&fitted.estimate.x);
     let gradient = &metric * &x;
     let square = x.dot(&gradient);
     let correction = Correction { metric: &metric, x: &x, gradient: &gradient, square, variance_inflation };
-    let scale_priors = scale_priors(fitted, tolerance);
-    let hypotheses = hypotheses(fitted, tolerance, &scale_priors);
-    let posteriors = weighted_posteriors(&hypotheses, &scale_priors, &readings, &correction)?;
+    let alternatives = alternatives(fitted, tolerance, &readings);
+    let hypotheses = hypotheses(fitted, tolerance, &alternatives);
+    let posteriors = weighted_posteriors(&hypotheses, &alternatives, &readings, &correction)?;
     let total: f64 = posteriors.iter().map(|(w, _)| w).sum();
     let mean = |of: &dyn Fn(&Posterior) -> f64, only: &dyn Fn(&Posterior) -> bool| {
         let (mut sum, mut weight) = (0.0, 0.0);
@@ -189,20 +242,33 @@ pub fn benefit(
         }
         if weight > 0.0 { sum / weight } else { f64::NAN }
     };
-    let (any, without_scale) = (&|_: &Posterior| true, &|v: &Posterior| v.scale.is_none());
-    let with_scale = |v: &Posterior| v.scale.is_some();
+    let any = &|_: &Posterior| true;
+    let without_scale = &|v: &Posterior| v.scale.is_none() && v.law.is_none();
+    let with_scale = |v: &Posterior| v.scale.is_some() && v.law.is_none();
+    let without_law = |v: &Posterior| v.law.is_none();
+    let share = |only: &dyn Fn(&Posterior) -> bool| {
+        posteriors.iter().filter(|(_, v)| only(v)).map(|(w, _)| w).sum::<f64>() / total
+    };
     let scale = (!fits_scale(fitted)).then(|| {
         let value = mean(&|v| v.scale.map_or(0.0, |s| s.0), &with_scale);
         let variance = mean(&|v| v.scale.map_or(0.0, |s| s.1 + (s.0 - value).powi(2)), &with_scale);
         ScaleError {
-            probability: posteriors.iter().filter(|(_, v)| with_scale(v)).map(|(w, _)| w).sum::<f64>()
-                / total,
+            probability: share(&with_scale),
             value,
             sigma: variance.sqrt(),
             geometry_share: mean(&|v| v.geometry_share, &with_scale),
             estimated_mm: mean(&|v| v.estimated, &with_scale).max(0.0).sqrt(),
             nominal_mm: mean(&|v| v.nominal, &with_scale).max(0.0).sqrt(),
         }
+    });
+    let share_of = |law: SensorLaw| share(&|v| v.law == Some(law));
+    let likeliest =
+        readings.laws.iter().map(|(law, _)| *law).max_by(|a, b| share_of(*a).total_cmp(&share_of(*b)));
+    let law = likeliest.map(|kind| LawError {
+        kind,
+        probability: share(&|v| v.law.is_some()),
+        benefit_without: known(mean(&|v| v.probability, &without_law)),
+        benefit_with: known(mean(&|v| v.probability, &|v| v.law.is_some())),
     });
     let shares = fitted.sigmas().into_iter().zip(&fitted.priors);
     let estimated_mm = mean(&|v| v.estimated, any).max(0.0).sqrt();
@@ -223,11 +289,17 @@ pub fn benefit(
         ),
         scale_stated: tolerance.scale.is_some(),
         scale: scale.filter(|s| s.value.is_finite()),
+        law,
         readings: readings.count,
         determined: shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum(),
         parameters: x.len(),
         beyond_noise: None,
     })
+}
+
+/// A mean, unless there was nothing to average.
+fn known(mean: f64) -> Option<f64> {
+    (!mean.is_nan()).then_some(mean)
 }
 
 /// A mean, or another where there was nothing to average: all models have the stated scale error.
@@ -238,14 +310,14 @@ fn known_or(mean: f64, other: f64) -> f64 {
 /// Posteriors of all hypotheses of non-negligible evidence, with their weights relative to the largest.
 fn weighted_posteriors(
     hypotheses: &[Hypothesis],
-    scale_priors: &[ScalePrior],
+    alternatives: &[Alternative],
     readings: &LinearisedReadings,
     correction: &Correction<'_>,
 ) -> Option<Vec<(f64, Posterior)>> {
     let arm = correction.x.len();
     let equations: Vec<Equations> =
-        scale_priors.iter().map(|prior| prior.normal_equations(readings, arm)).collect();
-    let equations_of = |hypothesis: &Hypothesis| &equations[hypothesis.scale_prior];
+        alternatives.iter().map(|alternative| alternative.normal_equations(readings, arm)).collect();
+    let equations_of = |hypothesis: &Hypothesis| &equations[hypothesis.alternative];
     let evidences: Vec<Option<f64>> = hypotheses
         .par_iter()
         .map(|hypothesis| {
@@ -260,8 +332,11 @@ fn weighted_posteriors(
         .filter_map(|(hypothesis, evidence)| {
             checkpoint();
             let log = (*evidence)? - best;
-            (log > NEGLIGIBLE)
-                .then(|| Some((log.exp(), hypothesis.posterior(equations_of(hypothesis), correction)?)))?
+            (log > NEGLIGIBLE).then(|| {
+                let alternative = &alternatives[hypothesis.alternative];
+                let equations = equations_of(hypothesis);
+                Some((log.exp(), hypothesis.posterior(equations, alternative, correction)?))
+            })?
         })
         .collect::<Vec<_>>();
     (!posteriors.is_empty()).then_some(posteriors)
@@ -273,7 +348,13 @@ const NEGLIGIBLE: f64 = -14.0;
 impl LinearisedReadings {
     /// No readings of a model with `all` columns.
     fn none(all: usize) -> Self {
-        Self { matrix: DMatrix::zeros(all, all), right: DVector::zeros(all), square: 0.0, count: 0 }
+        Self {
+            matrix: DMatrix::zeros(all, all),
+            laws: Vec::new(),
+            right: DVector::zeros(all),
+            square: 0.0,
+            count: 0,
+        }
     }
 
     fn plus(mut self, more: Self) -> Self {
@@ -289,6 +370,7 @@ impl LinearisedReadings {
     fn project_scale_onto_arm(&mut self, fitted: &Fitted, tolerance: &Tolerance) -> Option<()> {
         let arm = fitted.parameters.len();
         let own = self.matrix.view((0, 0), (arm, arm)).into_owned();
+        let beyond = arm + 1..self.matrix.ncols();
         let mut matrix = own.clone();
         for (k, (parameter, prior)) in fitted.parameters.iter().zip(&fitted.priors).enumerate() {
             let sigma = match parameter {
@@ -307,6 +389,11 @@ impl LinearisedReadings {
             self.matrix[(k, arm)] = projected[k];
             self.matrix[(arm, k)] = projected[k];
         }
+        for law in beyond {
+            let along = coefficients.dot(&self.matrix.view((0, law), (arm, 1)).column(0));
+            self.matrix[(law, arm)] = along;
+            self.matrix[(arm, law)] = along;
+        }
         Some(())
     }
 }
@@ -319,22 +406,31 @@ fn fits_scale(fitted: &Fitted) -> bool {
     fitted.frames.disturbances.iter().any(|d| d.kind == Kind::Scale && d.profile == Profile::Constant)
 }
 
-/// A point of the grid: scale prior, prior widths and noise.
+/// A point of the grid: what the sensor has, prior widths and noise.
 struct Hypothesis {
-    /// Index of the scale prior.
-    scale_prior: usize,
+    /// Index of what the sensor has.
+    alternative: usize,
     /// Logarithm of its probability.
     log_probability: f64,
-    /// Prior precision 1/σ² of each parameter, the scale error last.
+    /// Prior precision 1/σ² of each parameter, those of the sensor's errors last.
     precision: Vec<f64>,
     /// The sensor's σ as a multiple of the fit's.
     noise: f64,
 }
 
-fn hypotheses(fitted: &Fitted, tolerance: &Tolerance, scale_priors: &[ScalePrior]) -> Vec<Hypothesis> {
+fn hypotheses(fitted: &Fitted, tolerance: &Tolerance, alternatives: &[Alternative]) -> Vec<Hypothesis> {
     let step = if fitted.parameters.len() > MANY { 2 } else { 1 };
     let mut out = Vec::new();
-    for (scale_prior, ScalePrior { sigma, probability }) in scale_priors.iter().enumerate() {
+    for (k, alternative) in alternatives.iter().enumerate() {
+        let of_law = alternative.columns.len() - usize::from(alternative.scale.is_some());
+        let noises: &[f64] =
+            if alternative.law.is_some() { &NOISE_FACTORS_BESIDE_LAW } else { &NOISE_FACTORS };
+        let noises = noises.iter().step_by(if alternative.law.is_some() { step } else { 1 });
+        let mut log_probability = alternative.probability.ln();
+        if alternative.law.is_some() {
+            // As probable as all noises of the other grid together, however many there are.
+            log_probability -= (noises.len() as f64 / NOISE_FACTORS.len() as f64).ln();
+        }
         for length in LENGTH_WIDTHS.iter().step_by(step) {
             for angle in ANGLE_WIDTHS.iter().step_by(step) {
                 let links =
@@ -345,10 +441,11 @@ fn hypotheses(fitted: &Fitted, tolerance: &Tolerance, scale_priors: &[ScalePrior
                         Parameter::Link { .. } => angle * tolerance.angle_rad,
                         _ => prior.sigma,
                     });
-                let precision: Vec<f64> = links.chain(*sigma).map(|s| 1.0 / (s * s)).collect();
-                out.extend(NOISE_FACTORS.map(|noise| Hypothesis {
-                    scale_prior,
-                    log_probability: probability.ln(),
+                let of_sensor = alternative.scale.into_iter().chain(std::iter::repeat_n(1.0, of_law));
+                let precision: Vec<f64> = links.chain(of_sensor).map(|s| 1.0 / (s * s)).collect();
+                out.extend(noises.clone().map(|&noise| Hypothesis {
+                    alternative: k,
+                    log_probability,
                     precision: precision.clone(),
                     noise,
                 }));
@@ -358,13 +455,13 @@ fn hypotheses(fitted: &Fitted, tolerance: &Tolerance, scale_priors: &[ScalePrior
     out
 }
 
-impl ScalePrior {
-    /// The readings' normal equations, with the scale error where this prior has one.
+impl Alternative {
+    /// The readings' normal equations, with the errors that the sensor has.
     fn normal_equations(&self, readings: &LinearisedReadings, arm: usize) -> Equations {
-        let size = arm + usize::from(self.sigma.is_some());
+        let kept: Vec<usize> = (0..arm).chain(self.columns.iter().copied()).collect();
         Equations {
-            matrix: readings.matrix.view((0, 0), (size, size)).into_owned(),
-            right: readings.right.rows(0, size).into_owned(),
+            matrix: readings.matrix.select_rows(&kept).select_columns(&kept),
+            right: readings.right.select_rows(&kept),
         }
     }
 }
@@ -399,6 +496,8 @@ struct Posterior {
     estimated: f64,
     /// Mean and variance of the scale error.
     scale: Option<(f64, f64)>,
+    /// The sensor's further error.
+    law: Option<SensorLaw>,
     /// Share of the squared correction attributed to geometry.
     geometry_share: f64,
 }
@@ -426,7 +525,12 @@ impl Hypothesis {
         log.is_finite().then_some(log)
     }
 
-    fn posterior(&self, equations: &Equations, correction: &Correction<'_>) -> Option<Posterior> {
+    fn posterior(
+        &self,
+        equations: &Equations,
+        alternative: &Alternative,
+        correction: &Correction<'_>,
+    ) -> Option<Posterior> {
         let (factor, _, all) = self.solve(equations)?;
         let Correction { metric, x, gradient, square, variance_inflation } = *correction;
         let arm = x.len();
@@ -438,12 +542,13 @@ impl Hypothesis {
         let unknown = variance_inflation * metric.component_mul(&covariance.view((0, 0), (arm, arm))).sum();
         let remaining = x - &mean;
         let explained = mean.dot(&(metric * &mean));
-        let scale = (all.len() > arm).then(|| (all[arm], covariance[(arm, arm)]));
+        let scale = alternative.scale.map(|_| (all[arm], covariance[(arm, arm)]));
         Some(Posterior {
             probability: if variance > 0.0 { normal_cdf(reduction / variance.sqrt()) } else { 0.5 },
             nominal: explained + unknown,
             estimated: remaining.dot(&(metric * &remaining)) + unknown,
             scale,
+            law: alternative.law,
             geometry_share: if square > 0.0 { explained / square } else { f64::NAN },
         })
     }
@@ -569,7 +674,7 @@ pub(crate) fn widen_by_scale(fitted: &mut Fitted, dataset: &Dataset, sigma: f64)
     if fits_scale(fitted) {
         return;
     }
-    let readings = linearise_readings(fitted, dataset);
+    let readings = linearise_readings(fitted, dataset, &[]);
     let Some(covariance) = &mut fitted.estimate.covariance else { return };
     let arm = covariance.nrows();
     let scale = readings.matrix.view((0, arm), (arm, 1)).into_owned();
@@ -578,14 +683,16 @@ pub(crate) fn widen_by_scale(fitted: &mut Fitted, dataset: &Dataset, sigma: f64)
 }
 
 /// Normal equations of the linear model J x = y, y = J x̂ − r, in one pass over the rows at the estimate x̂.
-fn linearise_readings(fitted: &Fitted, dataset: &Dataset) -> LinearisedReadings {
+fn linearise_readings(fitted: &Fitted, dataset: &Dataset, laws: &[SensorLaw]) -> LinearisedReadings {
     let problem = &fitted.problem;
     let (p, per) = (problem.parameters(), problem.rows_per_observation());
     let x = &fitted.estimate.x;
     let rotation = fitted.frames.base_from_sensor.rotation;
-    // Free frames take up where a scale error moves everything; stated ones do not.
+    // A scale about the mean reading does not move the sensor frame. Free frames take up where a scale error moves everything; stated ones do not.
     let centre = if has_stated_frames(fitted) { Vector3::zeros() } else { mean_reading(dataset) };
-    let all = p + 1;
+    let errors: Vec<SensorErrors<'_>> =
+        laws.iter().map(|&law| SensorErrors::of(law, fitted, dataset)).collect();
+    let all = p + 1 + errors.iter().map(|errors| errors.count).sum::<usize>();
     let part = |rows: Range<usize>| {
         let mut out = LinearisedReadings::none(all);
         for from in rows.clone().step_by(ROWS) {
@@ -606,6 +713,14 @@ fn linearise_readings(fitted: &Fitted, dataset: &Dataset) -> LinearisedReadings 
                     }
                 }
             }
+            for i in 0..if errors.is_empty() { 0 } else { to - from } {
+                let weight = problem.per_mm(from + i);
+                let here = errors.iter().flat_map(|errors| errors.at(from + i));
+                for (error, column) in here.zip(jacobian[n * (p + 1)..].chunks_exact_mut(n)) {
+                    let read = per.min(3);
+                    column[i * per..i * per + read].copy_from_slice(&(weight * error).as_slice()[..read]);
+                }
+            }
             let jacobian = DMatrix::from_vec(n, all, jacobian);
             let y = jacobian.columns(0, p) * DVector::from_column_slice(x) - DVector::from_vec(residuals);
             add_gram(&jacobian, &mut out.matrix);
@@ -620,7 +735,13 @@ fn linearise_readings(fitted: &Fitted, dataset: &Dataset) -> LinearisedReadings 
     let starts: Vec<usize> = (0..rows).step_by(PART).collect();
     let parts: Vec<LinearisedReadings> =
         starts.into_par_iter().map(|from| part(from..(from + PART).min(rows))).collect();
-    parts.into_iter().reduce(LinearisedReadings::plus).unwrap_or_else(|| LinearisedReadings::none(all))
+    let sum = parts.into_iter().reduce(LinearisedReadings::plus);
+    let mut first = p + 1;
+    let places = errors.iter().map(|errors| {
+        first += errors.count;
+        (errors.law, first - errors.count..first)
+    });
+    LinearisedReadings { laws: places.collect(), ..sum.unwrap_or_else(|| LinearisedReadings::none(all)) }
 }
 
 /// Rows that are processed together.
@@ -629,7 +750,6 @@ const ROWS: usize = 512;
 /// Rows of one thread's sum: the same for any number of threads.
 const PART: usize = 4 * ROWS;
 
-/// Mean reading: a scale about it does not move the sensor frame.
 /// Whether the prior of a frame is narrower than any free one's.
 fn has_stated_frames(fitted: &Fitted) -> bool {
     let of_frames = |parameter: &Parameter| {
@@ -640,12 +760,6 @@ fn has_stated_frames(fitted: &Fitted) -> bool {
 
 /// Standard deviation of a frame below which it was stated (mm).
 const STATED_MM: f64 = 100.0;
-
-/// The mean reading, of a cable its length along x (mm).
-pub(super) fn mean_reading(dataset: &Dataset) -> Vector3<f64> {
-    let n = dataset.rows.len().max(1) as f64;
-    dataset.rows.iter().map(|row| row.reading.place_mm() / n).sum()
-}
 
 /// M at `condition` over the region spanned by the poses `samples_deg` (°). δᵀ M δ is the mean square displacement (mm²) of the
 /// target by a change δ of the fit's parameters, rigid motions of base and target projected out. Rows and columns of

@@ -3,6 +3,10 @@
 //! The frame that fits the readings best is right to what the arm of the data sheet is off. A stated one that puts the readings elsewhere by
 //! far more is inverted, in metres, or of another set-up.
 //!
+//! In a small box an arm that is itself a few millimetres off looks like another frame, so that this alone refuses nothing: geometry is
+//! fitted with the stated frame and without it ([`judged_by_fit`]). A frame that is right leaves nearly as little; one that is wrong
+//! leaves much more, as no links make up for it.
+//!
 //! What is left of the difference once geometry is fitted is judged in standard deviations. With Δ from the fitted to the stated frame,
 //! S the covariance of the fitted one and P that of the stated one, χ² = Δᵀ (S + P)⁻¹ Δ, and the stated one is off by
 //! P (S + P)⁻¹ Δ. What links or a scale error of the sensor take up is in S.
@@ -12,14 +16,17 @@
 
 use nalgebra::{DMatrix, DVector, Point3, UnitQuaternion, Vector3, Vector6};
 
-use super::benefit::{mean_reading, widen_by_scale};
+use super::benefit::widen_by_scale;
 use super::calibration::Frames;
 use super::fit::{Fitted, Observations, errors_on};
+use super::identify::{Options, identify};
 use super::rounding::logged_covariance;
+use super::sensor_laws::mean_reading;
 use super::start::unseen_target;
 use super::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::registration::{known_target, target_in_known_frame};
+use crate::measurement::split;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_math::se3::{Pose, apply_twist};
@@ -40,7 +47,7 @@ const EXPLAINS: f64 = 0.1;
 const ASSUMED_TARGET_MM: f64 = 1.0;
 
 /// The tolerances with which geometry is fitted to judge a stated frame.
-pub fn tolerance_beside(dataset: &Dataset, nominal: &Model, tolerance: &Tolerance) -> Tolerance {
+fn tolerance_beside(dataset: &Dataset, nominal: &Model, tolerance: &Tolerance) -> Tolerance {
     let held = unseen_target(dataset, nominal).is_some();
     let target_mm = if held { tolerance.target_mm.min(ASSUMED_TARGET_MM) } else { tolerance.target_mm };
     Tolerance { target_mm, ..*tolerance }
@@ -207,6 +214,47 @@ pub fn contradiction_beside_geometry(
             square.sqrt(),
         )
     })
+}
+
+/// Error that any instrument has (mm): below it two fits do not differ.
+const ANY_NOISE_MM: f64 = 0.01;
+
+/// What speaks against a stated frame, of standard deviation `sigma` (mm; rad), by what geometry leaves with it and without it, and the fit
+/// without it. No judgement where that fails: the fit that is asked for says why.
+pub fn judged_by_fit(
+    [tolerance, of_arm]: [&Tolerance; 2],
+    (stated, found): (&Frames, &Frames),
+    sigma: [f64; 2],
+    (dataset, nominal): (&Dataset, &Model),
+) -> (Option<Option<String>>, Option<Fitted>) {
+    let of_arm = Tolerance { target_mm: tolerance.target_mm, ..*of_arm };
+    let of_arm = tolerance_beside(dataset, nominal, &of_arm);
+    let fit = |frames: &Frames, tolerance: Tolerance| {
+        let options = Options { tolerance, ..Options::default() };
+        let split = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
+        identify(dataset, "", nominal, frames, &split, &options).ok().map(|found| found.geometry)
+    };
+    let Some(free) = fit(found, of_arm) else { return (None, None) };
+    let with = fit(stated, Tolerance { frame_mm: sigma[0], frame_rad: sigma[1], ..of_arm });
+    (Some(contradiction_by_fit(dataset, &free, with.as_ref())), Some(free))
+}
+
+/// What speaks against a stated frame, or a cable's outlet and zero, by what geometry leaves `with` it beside what it leaves `free` of it;
+/// `None` if nothing does. Without a fit with it, none is possible.
+fn contradiction_by_fit(dataset: &Dataset, free: &Fitted, with: Option<&Fitted>) -> Option<String> {
+    let option = if dataset.sensor == Sensor::Cable { "--outlet and --cable-zero" } else { "--sensor-frame" };
+    let least_mm = free.sigma_mm;
+    let check = "check that it is the sensor in the arm's base, in mm and scalar first, and of this set-up, state how uncertain it is \
+                 (--frame-sigma), or leave it out";
+    match with {
+        None => Some(format!("{option}: no arm fits the readings with it: {check}")),
+        Some(with) => (with.sigma_mm > OF_FIT * least_mm.max(ANY_NOISE_MM)).then(|| {
+            format!(
+                "{option}: with it the best geometry leaves {:.3} mm along each axis, without it {least_mm:.3} mm: {check}",
+                with.sigma_mm
+            )
+        }),
+    }
 }
 
 fn is_of_frame(parameter: &Parameter) -> bool {

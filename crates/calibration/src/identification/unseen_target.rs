@@ -17,8 +17,9 @@ use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
 use truegrind_math::work::checkpoint;
 
-/// Share of its prior's standard deviation from which a direction counts as not seen.
-const UNSEEN_SHARE: f64 = 0.5;
+/// Standard deviation that the readings alone leave of a direction from which it counts as not seen (mm): more than half of the
+/// prior of a target of which nothing is stated is left. What is stated of it does not make it less seen.
+const UNSEEN_MM: f64 = 28.87;
 
 /// Distance of a tip from the target for which its further error is stated (mm).
 const TIP_MM: f64 = 100.0;
@@ -42,7 +43,8 @@ pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Esti
     // What an arm's unmodelled errors look like moves an unseen target farther than its standard deviation says.
     let is_frame_stated = place(Parameter::SensorFrame(0)).is_some_and(|k| fitted.priors[k].sigma < prior_mm);
     let is_held = !is_frame_stated && start::unseen_target(dataset, &estimated.nominal).is_some();
-    if !is_held && sigma_mm <= UNSEEN_SHARE * prior_mm {
+    let of_readings_mm = (sigma_mm.powi(-2) - prior_mm.powi(-2)).max(0.0).sqrt().recip();
+    if !is_held && of_readings_mm < UNSEEN_MM {
         return None;
     }
     let moved_mm = axes.map(|k| fitted.estimate.x[places[k]].abs()).into_iter().fold(0.0, f64::max);
@@ -53,15 +55,19 @@ pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Esti
     } else {
         "which turn the flange about one axis only".to_owned()
     };
+    let known_mm = sigma_mm.max(prior_mm).max(moved_mm);
+    // To what it is known to, not a rounded 0.
+    let decimals = if known_mm < 0.95 { (-known_mm.max(1e-3).log10().floor()) as usize } else { 0 };
+    // A rounded −0 is 0.
+    let [x, y, z] = axes.map(|k| {
+        let scale = 10_f64.powi(decimals as i32);
+        format!("{:.decimals$}", (at[k] * scale).round() / scale + 0.0)
+    });
     Some(format!(
         "the place of the target on the flange is not seen by these poses, {poses}: another place of the target is another place of the sensor. It \
-         is taken to be {:.0},{:.0},{:.0} mm and known to ± {:.0} mm only (--touched-point and --touched-sigma state it). The errors in mm here are \
+         is taken to be {x},{y},{z} mm and known to ± {known_mm:.decimals$} mm only (--touched-point and --touched-sigma state it). The errors in mm here are \
          those of the target; a tool whose tip is {TIP_MM:.0} mm from it may be off by a further {:.3} mm (1 sigma), and by as many times more as it \
          is farther away. To see it, measure two or three more poses with the flange turned by 30° or more about different axes",
-        at.x,
-        at.y,
-        at.z,
-        sigma_mm.max(prior_mm).max(moved_mm),
         tip_mm(estimated)
     ))
 }

@@ -5,8 +5,9 @@
 //! explains the readings as well as the links, or there are too few rows for their noise. A doubtful model is written only on
 //! request, and every use of it says so.
 
-use crate::identification::benefit::{Benefit, ScaleError};
+use crate::identification::benefit::{Benefit, LawError, ScaleError};
 use crate::identification::beyond_noise::BeyondNoise;
+use crate::identification::sensor_laws::SensorLaw;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Sensor;
 use truegrind_arm::estimated::{EstimatedParameter, Judgement, Verdict};
@@ -40,6 +41,8 @@ pub struct VerdictBuilder {
     failures: Vec<String>,
     doubts: Vec<String>,
     others: Vec<String>,
+    /// Which of these is the expected benefit.
+    benefit: Option<usize>,
     limits_stated: bool,
 }
 
@@ -132,6 +135,7 @@ impl VerdictBuilder {
         };
         let sentence = benefit_sentence(found);
         if found.probability >= MIN_PROBABILITY {
+            self.benefit = Some(self.others.len());
             self.note(sentence);
             match &found.scale {
                 Some(scale) if spoils(scale) => self.doubt(scale_sentence(scale, sensor)),
@@ -140,6 +144,13 @@ impl VerdictBuilder {
             return;
         }
         self.doubt(sentence);
+        // With the sensor's further error out of the question all would be well.
+        let is_to_blame =
+            |law: &&LawError| law.benefit_without.is_none_or(|without| without >= MIN_PROBABILITY);
+        if let Some(law) = found.law.as_ref().filter(is_to_blame) {
+            self.doubt(law_sentence(law));
+            return;
+        }
         if found.probability_without_scale < MIN_PROBABILITY {
             self.doubt(too_few_rows(found));
             return;
@@ -165,6 +176,12 @@ impl VerdictBuilder {
         };
         let mut reasons = std::mem::take(&mut self.failures);
         reasons.append(&mut self.doubts);
+        // What speaks against the model is not in its expected benefit.
+        if status == Judgement::Fail
+            && let Some(benefit) = self.benefit.and_then(|k| self.others.get_mut(k))
+        {
+            benefit.insert_str(0, "if what is said above were not so: ");
+        }
         reasons.append(&mut self.others);
         Verdict { status, reasons }
     }
@@ -273,6 +290,31 @@ fn scale_sentence(scale: &ScaleError, sensor: Sensor) -> String {
         percent_of(scale.probability),
         remedy(sensor)
     )
+}
+
+/// That the poses do not tell the arm from a further error of the sensor, and what to measure.
+fn law_sentence(law: &LawError) -> String {
+    let (error, remedy) = match law.kind {
+        SensorLaw::Pulley => (
+            "a cable that runs over a pulley at its outlet, of a radius of some 10 mm,",
+            "measure poses that turn the cable more widely about its outlet, best random ones all over the ranges of the joints, or some more with \
+             the outlet elsewhere; a cable that leaves its sensor through a small hole has no such error",
+        ),
+        SensorLaw::Drum => (
+            "a cable whose length is wound on in layers",
+            "measure poses at more directions of the cable for each of its lengths, best random ones all over the ranges of the joints, and the \
+             sensor itself against a known length",
+        ),
+    };
+    let explains = if law.probability > FOUND {
+        format!("{error} explains these readings better than the arm alone")
+    } else {
+        format!("these poses do not tell the arm from its sensor: {error} would read much the same")
+    };
+    let helps = law.benefit_with.map_or_else(String::new, |with| {
+        format!(", and with it the model improves programs with a probability of {} only", percent_of(with))
+    });
+    format!("{explains} (probability {}){helps}: {remedy}", percent_of(law.probability))
 }
 
 fn remedy(sensor: Sensor) -> &'static str {

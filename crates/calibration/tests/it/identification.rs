@@ -4,5 +4,7 @@ mod beyond_noise;
 mod calibration;
 mod prior_width;
 mod promise;
+mod sensor_laws;
+mod stated_frame;
 pub(crate) mod unseen_target;
 mod verdict;

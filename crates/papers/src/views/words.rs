@@ -10,11 +10,22 @@ pub(super) fn p(value: f64) -> String {
     if value < 1e-4 { "< 0.0001".to_owned() } else { Precision::Significant(2).format(value) }
 }
 
+/// Whether one of the two tests finds a difference and the other does not: that is no finding, but not "no difference" either.
+fn is_undecided(comparison: &Comparison) -> bool {
+    comparison.conclusion == Conclusion::NotSignificant && comparison.limited.signed_rank_holm < LEVEL
+}
+
+/// Whether neither test finds a difference.
+fn is_alike(comparison: &Comparison) -> bool {
+    comparison.conclusion == Conclusion::NotSignificant && !is_undecided(comparison)
+}
+
 /// Short conclusion for a table.
 pub(super) fn conclusion(comparison: &Comparison, reference: &str) -> String {
     match &comparison.conclusion {
         Conclusion::ReferenceBetter => format!("{reference} better"),
         Conclusion::MethodBetter => format!("{} better", comparison.id),
+        Conclusion::NotSignificant if is_undecided(comparison) => "undecided: one of two tests".to_owned(),
         Conclusion::NotSignificant => "no significant difference".to_owned(),
         Conclusion::SameOptimum { stopped, .. } if stopped.is_empty() => "same optimum".to_owned(),
         Conclusion::SameOptimum { stopped, .. } => match stopped.as_slice() {
@@ -31,11 +42,13 @@ pub(super) fn headline(study: &Study) -> String {
     let judgement = &study.judgement;
     let count =
         |fits: fn(&Conclusion) -> bool| judgement.comparisons.iter().filter(|c| fits(&c.conclusion)).count();
+    let of = |fits: fn(&Comparison) -> bool| judgement.comparisons.iter().filter(|c| fits(c)).count();
     let groups = [
         (count(|c| matches!(c, Conclusion::ReferenceBetter)), "significantly worse"),
         (count(|c| matches!(c, Conclusion::MethodBetter)), "significantly better"),
         (count(|c| matches!(c, Conclusion::SameOptimum { .. })), "with the same optimum"),
-        (count(|c| matches!(c, Conclusion::NotSignificant)), "without significant difference"),
+        (of(is_alike), "without significant difference"),
+        (of(is_undecided), "undecided, since only one of the two tests finds a difference"),
         (count(|c| matches!(c, Conclusion::Diverged { .. })), "diverged"),
         (
             count(|c| matches!(c, Conclusion::ReferenceDiverged { .. })),
@@ -77,9 +90,8 @@ pub(super) fn reservations(study: &Study) -> Vec<String> {
     let reference = &judgement.reference;
     let mut out = same_optimum(study);
     out.extend(diverged(study));
-    let unsure = |c: &&Comparison| c.conclusion == Conclusion::NotSignificant;
-    let (by_ranks, alike): (Vec<&Comparison>, Vec<&Comparison>) =
-        judgement.comparisons.iter().filter(unsure).partition(|c| c.limited.signed_rank_holm < LEVEL);
+    let of = |fits: fn(&Comparison) -> bool| judgement.comparisons.iter().filter(move |c| fits(c)).collect();
+    let (by_ranks, alike): (Vec<&Comparison>, Vec<&Comparison>) = (of(is_undecided), of(is_alike));
     if !by_ranks.is_empty() {
         let each: Vec<String> =
             by_ranks.iter().map(|c| format!("{} ({} mm)", c.id, mm(c.limited.mean_mm))).collect();
@@ -198,9 +210,9 @@ fn papers_order(study: &Study) -> Option<String> {
     if *id != study.judgement.reference {
         return None;
     }
-    let of = |fits: fn(&Conclusion) -> bool| -> Vec<&Comparison> {
+    let of = |fits: fn(&Comparison) -> bool| -> Vec<&Comparison> {
         let judged = study.judgement.comparisons.iter();
-        judged.filter(|c| printed(&c.id).is_some() && fits(&c.conclusion)).collect()
+        judged.filter(|c| printed(&c.id).is_some() && fits(c)).collect()
     };
     let mut parts = Vec::new();
     let mut part = |found: &[&Comparison], what: &str| {
@@ -208,29 +220,31 @@ fn papers_order(study: &Study) -> Option<String> {
             parts.push(format!("{what} {}", ids(found)));
         }
     };
-    part(&of(|c| matches!(c, Conclusion::ReferenceBetter)), "this is significant against");
-    part(&of(|c| matches!(c, Conclusion::MethodBetter)), "the opposite is significant for");
+    part(&of(|c| matches!(c.conclusion, Conclusion::ReferenceBetter)), "this is significant against");
+    part(&of(|c| matches!(c.conclusion, Conclusion::MethodBetter)), "the opposite is significant for");
     part(
-        &of(|c| matches!(c, Conclusion::NotSignificant | Conclusion::SameOptimum { .. })),
+        &of(|c| is_alike(c) || matches!(c.conclusion, Conclusion::SameOptimum { .. })),
         "there is no significant difference from",
     );
+    part(&of(is_undecided), "one of the two tests finds a difference, the other does not, against");
     Some(format!("The paper has {id} before all others. Here {}.", parts.join("; ")))
 }
 
 /// The methods with the least cost among those not shown to be worse than the reference.
 fn cheapest(study: &Study) -> Option<String> {
     let reference = &study.judgement.reference;
-    let conclusion = |id: &str| {
+    let comparison = |id: &str| {
         let of = |c: &&Comparison| c.id == id;
-        study.judgement.comparisons.iter().find(of).map(|c| &c.conclusion)
+        study.judgement.comparisons.iter().find(of)
     };
-    let any_better =
-        study.results.iter().any(|r| conclusion(&r.method.id) == Some(&Conclusion::MethodBetter));
-    let is_not_worse = |r: &&MethodResult| match conclusion(&r.method.id) {
+    let any_better = study
+        .results
+        .iter()
+        .any(|r| comparison(&r.method.id).is_some_and(|c| c.conclusion == Conclusion::MethodBetter));
+    let is_not_worse = |r: &&MethodResult| match comparison(&r.method.id) {
         None => !any_better && r.outcomes.iter().all(|o| !o.diverged),
-        Some(Conclusion::MethodBetter) => true,
-        Some(Conclusion::NotSignificant | Conclusion::SameOptimum { .. }) => !any_better,
-        Some(_) => false,
+        Some(c) if c.conclusion == Conclusion::MethodBetter => true,
+        Some(c) => !any_better && (is_alike(c) || matches!(c.conclusion, Conclusion::SameOptimum { .. })),
     };
     let mut left: Vec<(&str, f64)> = study
         .results

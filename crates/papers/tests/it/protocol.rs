@@ -116,6 +116,22 @@ fn the_verdict_says_what_the_paper_has_and_which_method_costs_least() {
     }
 }
 
+/// One of two tests finds a difference: that was "no significant difference" in the headline, and undecided ten lines below.
+#[test]
+fn a_difference_that_one_test_finds_is_undecided_and_not_absent() {
+    let with_paper = METHODS.replace("name = \"LM\"\n", "name = \"LM\"\npaper = { rmse_mm = 0.3 }\n");
+    let (experiment, mut study, _) = study(&with_paper, None).unwrap();
+    let judged = &mut study.judgement.comparisons;
+    let unsure = judged.iter_mut().find(|c| c.conclusion == Conclusion::NotSignificant).unwrap();
+    unsure.limited.signed_rank_holm = 0.02;
+    let id = unsure.id.clone();
+    let results = Results::Methods(Box::new(study));
+    let text = format::terminal::document(&view::summary(&experiment, &results), 400);
+    assert!(text.contains("1 undecided, since only one of the two tests finds a difference"), "{text}");
+    assert!(!text.contains("without significant difference"), "{text}");
+    assert!(!text.contains(&format!("there is no significant difference from {id}")), "{text}");
+}
+
 #[test]
 fn curves_are_in_millimetres_of_what_the_method_is_judged_by() {
     // A length; the network's rows are weighed by the sensor, and begin where the frames alone are all the same.

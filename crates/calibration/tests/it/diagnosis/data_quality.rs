@@ -5,8 +5,9 @@ use truegrind_arm::model::Model;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
+use truegrind_calibration::diagnosis::transfer::new_rows;
 use truegrind_calibration::identification::tolerance::Tolerance;
-use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
+use truegrind_calibration::measurement::dataset::{Dataset, Row, Sensor};
 
 use super::scenarios::frames;
 use super::simulator::{Hidden, Log, Setup, run};
@@ -144,4 +145,54 @@ fn another_series_judges_the_written_arm() {
     assert_eq!(worse.estimated.verdict.status, Judgement::Fail);
     assert!(worse.estimated.verdict.reasons[0].contains("`identify`"), "{:?}", worse.estimated.verdict);
     assert_eq!(worse.diagnosis.verdict.as_ref(), Some(&worse.estimated.verdict));
+}
+
+/// Another measurement of an arm that is not as it was fitted is no number beside a good verdict: a joint that has moved since, a joint that
+/// counts the other way, another arm of the type.
+#[test]
+fn another_measurement_says_that_the_arm_was_another() {
+    let all = run(&arm(), &[], &setup(400, 61)).dataset;
+    let (own, other): (Vec<usize>, Vec<usize>) = (0..400).partition(|i| i % 2 == 0);
+    let (own, other) = (all.subset(&own), all.subset(&other));
+    let tolerance = Tolerance::default();
+    let found = diagnosed(&own, &arm());
+    assert_eq!(found.estimated.verdict.status, Judgement::NotEvaluated);
+    let with = |change: &dyn Fn(&mut Row)| {
+        let mut rows: Vec<Row> = other.rows.iter().cloned().collect();
+        rows.iter_mut().for_each(change);
+        let changed = Dataset { rows: rows.into(), ..other.clone() };
+        let mut judged = found.clone();
+        judged.test_on(&changed, &frames(&changed, &arm()), &tolerance, true);
+        let verdict = judged.estimated.verdict;
+        (verdict.status, verdict.reasons[0].clone())
+    };
+    assert_eq!(with(&|_| ()).0, Judgement::NotEvaluated, "the arm itself");
+    let (status, said) = with(&|row| row.joints[1] += 0.1_f64.to_radians());
+    assert!(status == Judgement::Doubtful && said.contains("has changed"), "{status:?} {said}");
+    let (status, said) = with(&|row| row.joints[3] *= -1.0);
+    assert!(status == Judgement::Fail && said.contains("counts the other way"), "{status:?} {said}");
+    let another = run(&arm(), &[], &setup(200, 62)).dataset;
+    let mut judged = found.clone();
+    judged.test_on(&another, &frames(&another, &arm()), &tolerance, true);
+    let verdict = judged.estimated.verdict;
+    assert!(
+        matches!(verdict.status, Judgement::Doubtful | Judgement::Fail)
+            && verdict.reasons[0].contains("another"),
+        "{verdict:?}"
+    );
+}
+
+/// The rows of the fit are no other measurement.
+#[test]
+fn copies_test_nothing() {
+    let all = run(&arm(), &[], &setup(100, 61)).dataset;
+    let [own, part, mixed] = [0..60, 20..50, 30..100].map(|rows| all.subset(&rows.collect::<Vec<usize>>()));
+    let mut notes = Vec::new();
+    assert_eq!(new_rows(&own, &part, &mut notes), None);
+    assert!(notes.remove(0).contains("30 of its 30 rows"));
+    assert_eq!(new_rows(&own, &mixed, &mut notes).unwrap().rows.len(), 40);
+    assert!(notes.remove(0).contains("the other 40"));
+    let fresh = all.subset(&(60..100).collect::<Vec<usize>>());
+    assert_eq!(new_rows(&own, &fresh, &mut notes).unwrap().rows.len(), 40);
+    assert!(notes.is_empty());
 }

@@ -136,7 +136,7 @@ impl Case {
     }
 }
 
-fn identified(dataset: &Dataset, robot: &str, nominal: &Model) -> Option<Identification> {
+pub fn identified(dataset: &Dataset, robot: &str, nominal: &Model) -> Option<Identification> {
     let options = Options {
         tolerance: Tolerance { learn_widths: true, ..Tolerance::default() },
         solver: &SOLVERS[0],
@@ -154,7 +154,7 @@ fn identified(dataset: &Dataset, robot: &str, nominal: &Model) -> Option<Identif
 }
 
 /// RMS distance between a point on two arms (mm) after base and point were placed as well as they can be.
-fn placed_rms_mm(actual: &Model, model: &Model, poses: &[Joints], target: &Pose) -> f64 {
+pub fn placed_rms_mm(actual: &Model, model: &Model, poses: &[Joints], target: &Pose) -> f64 {
     let still = Condition::default();
     let (real, known) = (actual.at_condition(&still), model.at_condition(&still));
     let target = Pose::from_parts(target.translation, UnitQuaternion::identity());
