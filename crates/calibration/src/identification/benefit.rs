@@ -169,7 +169,7 @@ struct Alternative {
     columns: Vec<usize>,
 }
 
-/// Each scale error alone, and each further error beside the scale error that is likeliest before any reading.
+/// Each scale error alone, and beside each further error.
 fn alternatives(fitted: &Fitted, tolerance: &Tolerance, readings: &LinearisedReadings) -> Vec<Alternative> {
     let scale = fitted.parameters.len();
     let scale_priors = scale_priors(fitted, tolerance);
@@ -180,11 +180,14 @@ fn alternatives(fitted: &Fitted, tolerance: &Tolerance, readings: &LinearisedRea
         probability: (1.0 - any) * prior.probability,
         columns: prior.sigma.map(|_| scale).into_iter().collect(),
     });
-    let beside = readings.laws.iter().map(|(law, columns)| Alternative {
-        scale: scale_priors[0].sigma,
-        law: Some(*law),
-        probability: law.probability(),
-        columns: scale_priors[0].sigma.map(|_| scale).into_iter().chain(columns.clone()).collect(),
+    let priors = &scale_priors[..];
+    let beside = readings.laws.iter().flat_map(|(law, columns)| {
+        priors.iter().map(move |prior| Alternative {
+            scale: prior.sigma,
+            law: Some(*law),
+            probability: law.probability() * prior.probability,
+            columns: prior.sigma.map(|_| scale).into_iter().chain(columns.clone()).collect(),
+        })
     });
     alone.chain(beside).collect()
 }
