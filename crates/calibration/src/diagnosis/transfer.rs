@@ -1,7 +1,7 @@
 //! Transfer test: the models of one series on another of the same arm, with only the frames refitted.
 //!
 //! Real effects of the arm persist on another day and in another mounting; overfitted ones do not. An arm that was another one there, or
-//! that has changed in between, leaves far more than the held-out error, as `track` judges it too ([`Foreign`]).
+//! that has changed in between, leaves far more than the held-out error, as `track` judges it too.
 
 use std::borrow::Cow;
 use std::collections::HashSet;

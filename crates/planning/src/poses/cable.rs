@@ -1,7 +1,7 @@
 //! Clearance of a cable from the arm's links.
 //!
 //! Links are capsules with one radius: the segments between the origins of neighbouring joint frames, and the arm's own bodies as
-//! [`own_bodies`](super::own_bodies) assumes them. The wrist and the tool are excluded, since the cable is attached there.
+//! `own_bodies` assumes them. The wrist and the tool are excluded, since the cable is attached there.
 
 use nalgebra::{Point3, Vector3};
 

@@ -2,7 +2,7 @@
 //!
 //! Links are capsules: the segments between the origins of neighbouring joint frames, to the flange and on to the touched
 //! point, with one radius, halved from the wrist on. The first of them, the column on the base, never moves and is excluded.
-//! Which of them the arm can run into itself, and at what distance, is in [`own_bodies`](super::own_bodies).
+//! Which of them the arm can run into itself, and at what distance, is in `own_bodies`.
 //!
 //! A motion is checked continuously, not at sampled poses: a point of a link moves by no more than the sum over the joints of
 //! rotation times the largest distance of the link from the axis. One distance check therefore clears an interval of the
