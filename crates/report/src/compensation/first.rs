@@ -69,7 +69,7 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
         ),
         (_, 0) if left_cycles(listing) > 0 => (
             Status::Warning,
-            "Corrected, except for canned cycles: what they make deviates as before, and so it does from the rest",
+            "Corrected, except for canned cycles: their holes and pockets stay where they are, beside corrected paths",
         ),
         (_, 0) if !is_written => {
             (Status::Good, "All correctable motions would be corrected; nothing was written")
