@@ -122,8 +122,8 @@ fn estimated_links(model: &Estimated) -> Result<(), InvalidValue> {
             let (name, found) = (parameter.to_string(), estimated.get(coordinate));
             let (stated, of) = match values.get(name.as_str()) {
                 Some(value) => (*value, format!("parameter {name} of")),
-                // The list of parameters may be omitted.
-                None if model.order.contains(&parameter) => continue,
+                // The list of parameters may be omitted, and an arm from elsewhere may state neither parameters nor a covariance.
+                None if model.order.is_empty() || model.order.contains(&parameter) => continue,
                 None => (nominal.get(coordinate), format!("{name}, which is no parameter, nominally of")),
             };
             if !((found - stated).abs() <= SAME_LINK) {

@@ -6,8 +6,8 @@ use truegrind_arm::estimated::{
     Estimated, EstimatedParameter, Judgement, PosteriorComponent, Provenance, StageErrors, Verdict,
     WidthUncertainty,
 };
-use truegrind_arm::model::Joints;
-use truegrind_arm::parameter::link_parameters;
+use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::parameter::{Parameter, link_parameters};
 use truegrind_arm::region::Region;
 use truegrind_arm::robots;
 use truegrind_math::statistics::ErrorSummary;
@@ -40,21 +40,31 @@ fn arm(ratio: [f64; 3], width_uncertainty: Option<WidthUncertainty>) -> Estimate
     let x = &covariance * slopes.tr_mul(&readings);
     let summary = ErrorSummary::of([0.1, -0.2]);
     let stage = StageErrors { fitted: summary, held_out: summary };
+    let mut model = nominal.clone();
+    for (parameter, deviation) in order.iter().zip(&x) {
+        let Parameter::Link { joint, coordinate } = *parameter else { continue };
+        let link = &mut model.links[joint];
+        link.set(coordinate, link.get(coordinate) + deviation);
+    }
+    let of = |arm: &Model, k: usize| match order[k] {
+        Parameter::Link { joint, coordinate } => arm.links[joint].get(coordinate),
+        _ => f64::NAN,
+    };
     let parameters = (0..n).map(|k| EstimatedParameter {
         name: order[k].to_string(),
         unit: order[k].unit().to_owned(),
-        nominal: 0.25,
-        value: 0.25 + x[k],
+        nominal: of(&nominal, k),
+        value: of(&model, k),
         sigma: covariance[(k, k)].sqrt(),
         prior_sigma: Some(prior(k)),
         determined: 0.5,
     });
     Estimated {
         robot: "abb-irb-120".into(),
-        model: nominal.clone(),
-        nominal,
+        model: model.clone(),
+        nominal: nominal.clone(),
         parameters: parameters.collect(),
-        order,
+        order: order.clone(),
         covariance,
         width_uncertainty,
         provenance: Provenance::default(),
