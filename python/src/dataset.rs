@@ -15,7 +15,7 @@ use truegrind::{Dataset, ImportOptions, Reading, Robot, Sensor, read_measurement
 use crate::arrays::{Numbers, numbers};
 use crate::errors::Refusal;
 use crate::files;
-use crate::running::run;
+use crate::interruptible::run;
 use crate::types::{Anything, ArrayLike, Floats, Object, PathOrBytes, Sensors, Typed};
 
 /// Measured poses: logged joint angles and the readings of one sensor.

@@ -16,9 +16,9 @@ use truegrind::{
 
 use crate::dataset::PyDataset;
 use crate::errors::Refusal;
+use crate::interruptible::run;
 use crate::model::{PyModel, parameters};
 use crate::robot::named;
-use crate::running::run;
 use crate::types::{Arrays, Dictionaries, Judgements, NamedRobot, Object, Progress, Typed};
 
 /// Result of an identification.
@@ -210,7 +210,18 @@ pub(crate) fn positive(name: &str, value: f64) -> Result<f64, Refusal> {
     Err(Refusal::argument(name, value, "a number above 0"))
 }
 
-/// A number that is not negative, as the library counts.
+/// A finite number that is not negative.
+///
+/// # Errors
+/// Names the argument.
+pub(crate) fn not_negative(name: &str, value: f64) -> Result<f64, Refusal> {
+    if value >= 0.0 && value.is_finite() {
+        return Ok(value);
+    }
+    Err(Refusal::argument(name, value, "a number, 0 or above"))
+}
+
+/// A count that is not negative, as the library counts.
 ///
 /// # Errors
 /// Names the argument.

@@ -6,11 +6,13 @@ mod dataset;
 mod errors;
 mod files;
 mod fits;
+mod interruptible;
 mod model;
-mod others;
+mod plan;
 mod programs;
 mod robot;
-mod running;
+mod simulation;
+mod track;
 mod types;
 
 use pyo3::prelude::*;
@@ -39,11 +41,15 @@ mod _truegrind {
     #[pymodule_export]
     use crate::model::PyModel;
     #[pymodule_export]
-    use crate::others::{PyPlan, PySimulation, PyTrack, plan_, simulate, track_};
+    use crate::plan::{PyPlan, plan_};
     #[pymodule_export]
     use crate::programs::{PyCompensation, PyDeviation, compensate_, deviation_};
     #[pymodule_export]
     use crate::robot::{PyArm, PyRobot, catalogue, forward_of, inverse_of};
+    #[pymodule_export]
+    use crate::simulation::{PySimulation, simulate};
+    #[pymodule_export]
+    use crate::track::{PyTrack, track_};
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "as Python names it")]

@@ -26,9 +26,9 @@ use crate::arm::Stated;
 use crate::errors::{Kind, Refusal};
 use crate::files;
 use crate::fits::positive;
+use crate::interruptible::run;
 use crate::model::{PyModel, named};
 use crate::robot::PyArm;
-use crate::running::run;
 use crate::types::{
     Columns, Counts, Dictionaries, Files, NamedModel, Object, PathOrText, ProgramFiles, Progress, Typed,
 };

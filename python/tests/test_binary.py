@@ -58,11 +58,17 @@ def test_simulate_gives_the_bytes_of_the_binary(run, tmp_path):
     assert made.actual.to_toml() == (tmp_path / "arm.toml").read_text(encoding="utf-8")
 
 
-def test_plan_gives_the_bytes_of_the_binary(run, tmp_path):
+@pytest.mark.parametrize("frame", [None, [2000, 500, 300]])
+def test_plan_gives_the_bytes_of_the_binary(run, tmp_path, frame):
+    """With a stated sensor frame the line of sight stays clear of the links."""
     program = tmp_path / "poses.mod"
-    options = ("--robot", "abb-irb-120", "--sensor", "position", "--poses", 12, "--candidates", 200)
+    options = ["--robot", "abb-irb-120", "--sensor", "position", "--poses", 12, "--candidates", 200]
+    if frame:
+        options += ["--sensor-frame", ",".join(map(str, frame))]
     printed = run("plan", *options, "--touched-point", "20,0,50", "--json", "-o", program)
-    planned = tg.plan("abb-irb-120", "position", poses=12, candidates=200, touched_point=[20, 0, 50])
+    planned = tg.plan(
+        "abb-irb-120", "position", poses=12, candidates=200, sensor_frame=frame, touched_point=[20, 0, 50]
+    )
     assert planned.to_json().encode() == printed
     assert planned.program().encode() == program.read_bytes()
 

@@ -6,13 +6,15 @@ use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 use truegrind::calibration::measurement::dataset::Sensor;
-use truegrind::planning::poses::candidate::Bounds;
+use truegrind::planning::poses::candidate::{Bounds, MARGIN_DEG};
 use truegrind::planning::poses::design::Index;
 use truegrind::planning::poses::keep_out::KeepOut;
 use truegrind::planning::poses::program::{ProgramSettings, draft};
 use truegrind::planning::poses::rows::Noise;
-use truegrind::planning::poses::schedule::Visits;
-use truegrind::planning::poses::{FIELD_POSES, MeasurementSetup, Options, plan, questions};
+use truegrind::planning::poses::schedule::{APPROACH_DEG, Visits};
+use truegrind::planning::poses::{
+    FIELD_POSES, MeasurementSetup, Options, READING_DEG, plan, questions, reach_mm,
+};
 use truegrind::programs::rapid::writer;
 use truegrind::report::planning as view;
 
@@ -79,7 +81,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "MM")]
     sigma: Option<f64>,
     /// Standard deviation of a measured orientation (°).
-    #[arg(long, value_name = "DEG", default_value_t = 0.006)]
+    #[arg(long, value_name = "DEG", default_value_t = READING_DEG)]
     sigma_angle: f64,
     /// Box that must contain the measured point, in the base frame: lower and upper corner x,y,z,x,y,z (mm).
     #[arg(long = "box", value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true)]
@@ -103,37 +105,37 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     link_radius: Option<f64>,
     /// Distance from the joint limits (°), at least --approach.
-    #[arg(long, value_name = "DEG", default_value_t = 6.0)]
+    #[arg(long, value_name = "DEG", default_value_t = MARGIN_DEG)]
     margin: f64,
     /// Smallest distance to a singularity.
-    #[arg(long, default_value_t = 0.05)]
+    #[arg(long, default_value_t = Bounds::default().min_singularity)]
     singularity: f64,
     /// Number of poses measured two more times, to determine the noise floor.
-    #[arg(long, default_value_t = 4)]
+    #[arg(long, default_value_t = Visits::default().repeats)]
     repeats: usize,
     /// Number of poses measured again with the opposite approach direction, to detect backlash.
-    #[arg(long, default_value_t = 12)]
+    #[arg(long, default_value_t = Visits::default().both_sides)]
     both_sides: usize,
     /// Number of visits of one pose spread over the run, to detect thermal drift.
-    #[arg(long, default_value_t = 8)]
+    #[arg(long, default_value_t = Visits::default().warm_up)]
     warm_up: usize,
     /// Length of each approach move, in every joint (°).
-    #[arg(long, value_name = "DEG", default_value_t = 3.0)]
+    #[arg(long, value_name = "DEG", default_value_t = APPROACH_DEG)]
     approach: f64,
     /// Waiting time before a reading (s).
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     settle: f64,
     /// Expected time per row (s), for effects that change with time.
-    #[arg(long, value_name = "S", default_value_t = 12.0)]
+    #[arg(long, value_name = "S", default_value_t = Visits::default().seconds_per_row)]
     seconds_per_row: f64,
     /// Speed between poses (mm/s).
     #[arg(long, value_name = "MM/S", default_value_t = 200.0)]
     speed: f64,
     /// Non-centrality above which an effect counts as detectable.
-    #[arg(long, default_value_t = 25.0)]
+    #[arg(long, default_value_t = Options::default().decisive)]
     decisive: f64,
     /// Number of random candidate poses.
-    #[arg(long, default_value_t = 2000)]
+    #[arg(long, default_value_t = Options::default().candidates)]
     candidates: usize,
     #[command(flatten)]
     stated: StatedFrameArguments,
@@ -157,9 +159,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         SensorArgument::Pose => Sensor::Pose,
     };
     let frames = arguments.stated.planned(sensor)?;
-    let reach: f64 = robot.model.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum();
-    let options = options(arguments, &robot.sheet.name, sensor, reach)?;
     let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
+    let options = options(arguments, &robot.sheet.name, &setup)?;
     let work = Spinner::start(format!("choosing among {} poses", arguments.candidates));
     let planned = on_threads(arguments.common.threads, || plan(&setup, &options))?
         .map_err(|e| anyhow!("{}: {e}", robot.sheet.name))?;
@@ -194,9 +195,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Ok(if rough { ExitStatus::Flagged } else { ExitStatus::Done })
 }
 
-/// Number of poses where none is stated.
-const POSES: usize = 60;
-
 /// Largest number of poses.
 const MAX_POSES: usize = 2000;
 
@@ -204,7 +202,7 @@ const MAX_POSES: usize = 2000;
 const MAX_CANDIDATES: usize = 100_000;
 
 /// The space that the arm must keep out of.
-fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<KeepOut> {
+fn space(arguments: &Arguments, usual: KeepOut, reach_mm: f64) -> anyhow::Result<KeepOut> {
     let mut boxes_mm = Vec::new();
     for text in &arguments.keep_out {
         match numbers("--keep-out", text)?[..] {
@@ -217,7 +215,7 @@ fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<KeepOut> {
     if !arguments.floor.is_finite() {
         bail!("--floor {}: expected a height in mm", arguments.floor);
     }
-    let radius_mm = arguments.link_radius.unwrap_or(reach_mm / 12.0);
+    let radius_mm = arguments.link_radius.unwrap_or(usual.radius_mm);
     if !(0.0..=reach_mm).contains(&radius_mm) {
         bail!("--link-radius {radius_mm}: expected 0 up to the reach of {reach_mm:.0} mm");
     }
@@ -226,7 +224,7 @@ fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<KeepOut> {
 }
 
 /// Refuses numbers and counts out of range.
-fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
+fn check_numbers(arguments: &Arguments, sigma: f64, usual_poses: usize) -> anyhow::Result<()> {
     for (name, value) in [
         ("--sigma", sigma),
         ("--sigma-angle", arguments.sigma_angle),
@@ -248,7 +246,7 @@ fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
             bail!("{name} {value}: expected 0 or more");
         }
     }
-    let poses = arguments.poses.unwrap_or(POSES);
+    let poses = arguments.poses.unwrap_or(usual_poses);
     if poses < 4 {
         bail!("--poses {poses}: expected at least 4; some 50 to 100 are usual");
     }
@@ -304,9 +302,11 @@ fn left_open(arguments: &Arguments, robot: &str) -> anyhow::Result<questions::Op
     })
 }
 
-fn options(arguments: &Arguments, robot: &str, sensor: Sensor, reach_mm: f64) -> anyhow::Result<Options> {
-    let sigma = arguments.sigma.unwrap_or(if sensor == Sensor::Cable { 0.05 } else { 0.03 });
-    check_numbers(arguments, sigma)?;
+fn options(arguments: &Arguments, robot: &str, setup: &MeasurementSetup<'_>) -> anyhow::Result<Options> {
+    let sight_is_known = arguments.stated.states_sensor_frame();
+    let usual = Options::usual(setup.nominal, setup.sensor, sight_is_known);
+    let sigma = arguments.sigma.unwrap_or(usual.noise.reading_mm);
+    check_numbers(arguments, sigma, usual.poses)?;
     let box_mm = match &arguments.box_mm {
         None => None,
         Some(text) => match numbers("--box", text)?[..] {
@@ -321,20 +321,19 @@ fn options(arguments: &Arguments, robot: &str, sensor: Sensor, reach_mm: f64) ->
             _ => bail!("--range {text}: expected min,max (mm)"),
         },
     };
-    let sees = sensor == Sensor::Cable || arguments.stated.states_sensor_frame();
     let clearance_mm = match arguments.clearance {
-        None => sees.then_some(reach_mm / 12.0),
-        Some(_) if !sees => {
+        None => usual.bounds.clearance_mm,
+        Some(_) if usual.bounds.clearance_mm.is_none() => {
             bail!("--clearance: the line of sight is known with --sensor-frame alone: state it too")
         }
         Some(0.0) => None,
         Some(mm) if mm > 0.0 && mm.is_finite() => Some(mm),
         Some(mm) => bail!("--clearance {mm}: expected 0 or more (mm)"),
     };
-    let space = space(arguments, reach_mm)?;
+    let space = space(arguments, usual.bounds.space, reach_mm(setup.nominal))?;
     let questions::Open { questions, something_else, joint_scatters } = left_open(arguments, robot)?;
     let approach_rad = arguments.approach.to_radians();
-    let poses = arguments.poses.unwrap_or(if joint_scatters { FIELD_POSES } else { POSES });
+    let poses = arguments.poses.unwrap_or(if joint_scatters { FIELD_POSES } else { usual.poses });
     // Whether it differs by the side or from time to time is asked at every pose.
     let [repeats, both_sides, warm_up] = match joint_scatters {
         true => [poses, poses, 0],

@@ -47,7 +47,7 @@ use truegrind_calibration::diagnosis::something_else::SomethingElse;
 use truegrind_calibration::identification::fit::frame_parameters;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 
-pub use self::options::{FIELD_POSES, Options};
+pub use self::options::{FIELD_POSES, Options, READING_DEG, reach_mm};
 pub use self::setup::MeasurementSetup;
 
 /// A plan.

@@ -34,10 +34,13 @@ pub struct Bounds {
     pub space: KeepOut,
 }
 
+/// Usual distance of every joint from its limits (°).
+pub const MARGIN_DEG: f64 = 6.0;
+
 impl Default for Bounds {
     fn default() -> Self {
         Self {
-            margin_rad: 6.0_f64.to_radians(),
+            margin_rad: MARGIN_DEG.to_radians(),
             min_singularity: 0.05,
             box_mm: None,
             distance_mm: None,

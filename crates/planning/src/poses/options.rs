@@ -1,10 +1,13 @@
 //! Settings of a plan.
 
 use super::candidate::Bounds;
+use super::keep_out::KeepOut;
 use super::questions::Question;
 use super::schedule::Visits;
+use truegrind_arm::model::Model;
 use truegrind_calibration::diagnosis::something_else::SomethingElse;
 use truegrind_calibration::identification::tolerance::Tolerance;
+use truegrind_calibration::measurement::dataset::Sensor;
 
 /// Settings of a plan.
 #[derive(Debug, Clone)]
@@ -60,7 +63,37 @@ impl Default for Options {
 /// Poses or visits for what no cause explains.
 pub const FIELD_POSES: usize = 10;
 
+/// Radius of the links, and distance of a cable or line of sight from them, as a share of the reach.
+const LINK_SHARE: f64 = 1.0 / 12.0;
+
+/// Distance from the mounting plane to the flange of the stretched arm, at most (mm).
+pub fn reach_mm(nominal: &Model) -> f64 {
+    nominal.links[1..].iter().map(|link| link.a_mm.abs() + link.d_mm.abs()).sum()
+}
+
 impl Options {
+    /// The usual settings for an arm and a sensor: the links, with a radius of a twelfth of the reach, stay above the mounting plane and as far
+    /// from a cable or a line of sight, where one is known.
+    pub fn usual(nominal: &Model, sensor: Sensor, sight_is_known: bool) -> Self {
+        let about_links_mm = LINK_SHARE * reach_mm(nominal);
+        let visits = Visits::default();
+        Self {
+            noise: Noise::usual(sensor),
+            bounds: Bounds {
+                clearance_mm: (sensor == Sensor::Cable || sight_is_known).then_some(about_links_mm),
+                space: KeepOut {
+                    floor_mm: Some(0.0),
+                    boxes_mm: Vec::new(),
+                    radius_mm: about_links_mm,
+                    approach_rad: visits.approach_rad,
+                },
+                ..Bounds::default()
+            },
+            visits,
+            ..Self::default()
+        }
+    }
+
     /// The same for `unexplained` alone: `count` poses for an error that follows the pose, without repeats; as many visits of one pose for an error
     /// that follows time, over as long a time as was measured before.
     pub fn for_something_else(self, unexplained: SomethingElse, count: usize) -> Self {
@@ -100,9 +133,20 @@ pub struct Noise {
     pub reading_rad: f64,
 }
 
+/// Usual standard deviation of an orientation (°).
+pub const READING_DEG: f64 = 0.006;
+
+impl Noise {
+    /// The usual noise of a sensor.
+    pub fn usual(sensor: Sensor) -> Self {
+        let reading_mm = if sensor == Sensor::Cable { 0.05 } else { 0.03 };
+        Self { reading_mm, reading_rad: READING_DEG.to_radians() }
+    }
+}
+
 impl Default for Noise {
     fn default() -> Self {
-        Self { reading_mm: 0.03, reading_rad: 1e-4 }
+        Self::usual(Sensor::Position)
     }
 }
 

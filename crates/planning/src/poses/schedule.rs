@@ -42,13 +42,16 @@ pub struct Visits {
     pub seconds_per_row: f64,
 }
 
+/// Usual distance from a pose at which its approach begins, in every joint (°).
+pub const APPROACH_DEG: f64 = 3.0;
+
 impl Default for Visits {
     fn default() -> Self {
         Self {
             repeats: 4,
             both_sides: 12,
             warm_up: 8,
-            approach_rad: 3.0_f64.to_radians(),
+            approach_rad: APPROACH_DEG.to_radians(),
             seconds_per_row: 12.0,
         }
     }
