@@ -6,8 +6,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyMapping, PySequence, PyString};
 use truegrind::compensation::cell::Used;
 use truegrind::compensation::cell::nc_setup::cell_setup;
-use truegrind::compensation::cell::robot_match::unreachable_motions;
-use truegrind::compensation::cell::robot_match::{cell_robot_mismatch, program_robot_mismatch};
+use truegrind::compensation::cell::robot_match::{
+    UnreachableMotions, cell_robot_mismatch, program_robot_mismatch, unreachable_motions,
+};
 use truegrind::compensation::deviation::files_of;
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
@@ -415,13 +416,7 @@ fn corrected(
     program.drop_trees();
     let program = program;
     let listing = program.listing();
-    let marked = marked(listing, &sources, &model.hash, again)?;
-    if let Some(done) = marked.iter().position(|marked| *marked) {
-        let name = &sources.files[done].0;
-        let message = format!("{name} is already compensated with this model: give the original program");
-        let told = Refusal::new(Kind::Program, message).of_file(name);
-        return Err(told.with("the mark of this model", "an original program"));
-    }
+    refuse_marked(listing, &sources, &model.hash, again)?;
     let found: Vec<String> =
         surface.iter().flat_map(|surface| surface_frame_contradictions(listing, surface)).collect();
     if !found.is_empty() {
@@ -433,28 +428,7 @@ fn corrected(
     report_step(&format!("rewriting {}", sources.name()));
     let Compensated { mut plan, rewritten } = compensate(&program, arm, &cell, &options, Some(mark))?;
     if let Some(found) = unreachable_motions(&plan) {
-        if let Some((_, error)) = found.example.filter(|_| 2 * found.other_configuration > found.count) {
-            let message = format!(
-                "{}: {} of the motions are in reach of {} only in other configurations than the program states ({error})",
-                sources.name(),
-                found.other_configuration,
-                arm.robot
-            );
-            let told = Refusal::new(Kind::Program, message).of_file(&sources.name());
-            return Err(told.with(error.to_string(), "the configurations of this robot"));
-        }
-        let motions = found.count;
-        let message = format!(
-            "{}: {motions} motions and hardly one in reach of {} ({}): the program is another robot's, or its tool and work \
-             object are not where it is told (cell); give the model of the robot that runs it",
-            sources.name(),
-            arm.robot,
-            model.name
-        );
-        let told = Refusal::new(Kind::Program, message).of_file(&sources.name());
-        return Err(
-            told.with(format!("{motions} motions and hardly one in reach"), "a program of this robot")
-        );
+        return Err(unreachable(&found, &sources.name(), arm, &model.name));
     }
     if let Some(surface) = &surface {
         plan.add_normals(surface);
@@ -477,6 +451,36 @@ fn corrected(
     let listing = listing.clone();
     drop((program, rewritten));
     Ok(PyCompensation { sources, corrected, plan, listing, report, unused })
+}
+
+/// Refuses a program that was compensated with this model.
+fn refuse_marked(listing: &Listing, sources: &Sources, hash: &str, again: bool) -> Result<(), Refusal> {
+    let marked = marked(listing, sources, hash, again)?;
+    let Some(done) = marked.iter().position(|marked| *marked) else { return Ok(()) };
+    let name = &sources.files[done].0;
+    let message = format!("{name} is already compensated with this model: give the original program");
+    let told = Refusal::new(Kind::Program, message).of_file(name);
+    Err(told.with("the mark of this model", "an original program"))
+}
+
+/// Refuses a program of which hardly a motion is in reach.
+fn unreachable(found: &UnreachableMotions, name: &str, arm: &Estimated, model: &str) -> Refusal {
+    let motions = found.count;
+    if let Some((_, error)) = found.example.as_ref().filter(|_| 2 * found.other_configuration > motions) {
+        let message = format!(
+            "{name}: {} of the motions are in reach of {} only in other configurations than the program states ({error})",
+            found.other_configuration, arm.robot
+        );
+        let told = Refusal::new(Kind::Program, message).of_file(name);
+        return told.with(error.to_string(), "the configurations of this robot");
+    }
+    let message = format!(
+        "{name}: {motions} motions and hardly one in reach of {} ({model}): the program is another robot's, or its tool and work \
+         object are not where it is told (cell); give the model of the robot that runs it",
+        arm.robot
+    );
+    let told = Refusal::new(Kind::Program, message).of_file(name);
+    told.with(format!("{motions} motions and hardly one in reach"), "a program of this robot")
 }
 
 /// Refuses a cell or a program of another robot.

@@ -170,8 +170,7 @@ pub fn run(
 ) -> Result<GrindingResult, ExperimentError> {
     let fail = |message: String| ExperimentError::Recipe { experiment: experiment.to_owned(), message };
     let sample = shipped(&settings.surface).map_err(fail)?;
-    let all = dataset.rows.len();
-    let seed = options.seed;
+    let (all, seed) = (dataset.rows.len(), options.seed);
     let measured = rows_of_a_case(settings, experiment, dataset, options)?;
     let surface = sample.read().map_err(|e| fail(e.to_string()))?;
     let path = toolpath(&surface, nominal, robot).map_err(|e| fail(e.to_string()))?;
@@ -179,23 +178,15 @@ pub fn run(
     let program =
         writer::write(&path.draft, Dialect::Siemens, Angles::Wpr).map_err(|e| fail(e.to_string()))?;
     let name = format!("{}.mpf", settings.surface);
-    // The program's comments state the tool and the work offset.
-    let setup = Setup::default();
+    let setup = Setup::default(); // The program's comments state the tool and the work offset.
     let task = Program::read(&[(name.as_str(), program.as_slice())], &setup);
     let taught = taught_cell(&surface, &path, nominal, ["T1", "G54"]).map_err(|e| fail(e.to_string()))?;
     // The tool was measured, as in the paper.
     let cell = Cell { tool: vec![CellFrame::of("T1", FrameOrigin::Metrology)], ..taught };
-    let stand_in = match actual {
-        Actual::Simulated(_) => None,
-        Actual::Estimated => {
-            let found = found(dataset, robot, nominal, &SOLVERS[0], settings.held_out, seed);
-            Some(found.map_err(fail)?.estimated.model)
-        }
-    };
-    let (model, after) = match (actual, &stand_in) {
-        (Actual::Simulated(model), _) => (model, After::Achieved),
-        (_, Some(model)) => (model, After::PredictedRemainder),
-        (Actual::Estimated, None) => (nominal, After::PredictedRemainder),
+    let estimated = || found(dataset, robot, nominal, &SOLVERS[0], settings.held_out, seed).map_err(fail);
+    let (model, after) = match actual {
+        Actual::Simulated(model) => (model.clone(), After::Achieved),
+        Actual::Estimated => (estimated()?.estimated.model, After::PredictedRemainder),
     };
     let shop = Shop {
         name: &name,
@@ -208,7 +199,7 @@ pub fn run(
         robot,
         held_out: settings.held_out,
         condition: Condition { payload_kg: Some(path.draft.tool.1.mass_kg), ..Condition::default() },
-        model,
+        model: &model,
         after,
     };
     let named = settings.method.iter().map(|m| solver::by_name(&m.solver).map_err(|e| fail(e.to_string())));
@@ -222,13 +213,13 @@ pub fn run(
         })
         .collect();
     let (rows, reports) = by_method(settings, &solvers, cases);
+    let split_of = |k| {
+        let rows = drawn(all, measured, seed + k);
+        split::random(&dataset.subset(&rows), settings.held_out, seed + k).of_whole(&rows)
+    };
     let named_causes = matches!(actual, Actual::Estimated).then(|| {
         let record = Record::of(dataset, nominal, false);
-        let diagnosed = |k| {
-            let rows = drawn(all, measured, seed + k);
-            let split = split::random(&dataset.subset(&rows), settings.held_out, seed + k);
-            record.diagnosed(&split.of_whole(&rows), robot, nominal)
-        };
+        let diagnosed = |k| record.diagnosed(&split_of(k), robot, nominal);
         (0..settings.cases as u64).into_par_iter().map(diagnosed).collect()
     });
     let against = against_reference(settings, &rows);

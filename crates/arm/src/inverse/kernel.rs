@@ -183,6 +183,51 @@ impl<R: SinCos> Factored<R> {
     }
 }
 
+/// Rows whose last step was too short for another one.
+struct Finished<R> {
+    /// 1 for such a row.
+    rows: R,
+    /// Their margins before that step.
+    margins: [R; 3],
+}
+
+impl<R: SinCos> Finished<R> {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn add(&mut self, rows: R, margins: &[R; 3]) {
+        for k in 0..3 {
+            self.margins[k] += rows * margins[k];
+        }
+        self.rows += rows;
+    }
+
+    /// 1 for each other row, and the margins of all rows, those of the others being `margins`.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn with_others(&self, margins: &[R; 3]) -> (R, [R; 3]) {
+        let open = self.rows.splat(1.0) - self.rows;
+        let mut all = *margins;
+        for k in 0..3 {
+            all[k] = open * all[k] + self.margins[k];
+        }
+        (open, all)
+    }
+}
+
+/// The axis of the missing rotation, times the sine of its angle; and 1 where the angle is less than a quarter turn, since beyond it the sine
+/// is ambiguous.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn missing_turn<R: SinCos>(axes: &[[R; 3]; 3], goal: &[[R; 3]; 3]) -> ([R; 3], R) {
+    let (zero, one) = (axes[0][0].splat(0.0), axes[0][0].splat(1.0));
+    let (mut turn, mut trace) = ([zero; 3], zero);
+    for (here, there) in axes.iter().zip(goal) {
+        let c = cross(here, there);
+        for (t, c) in turn.iter_mut().zip(c) {
+            *t += zero.splat(0.5) * c;
+        }
+        trace += dot(here, there);
+    }
+    (turn, (trace - one).positive())
+}
+
 impl Kernel {
     /// Solves for the mapped angles at which the last frame is at `goal`, from `start`.
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -199,8 +244,7 @@ impl Kernel {
         let goal_flange = at(&goal.origin, &goal.axes, &self.flange_mm);
         let mut mapped = *start;
         let (mut alive, mut steps) = (one, zero);
-        // Rows whose last step was too short for another one, and their margins before it.
-        let (mut finished, mut finished_margins) = (zero, [zero; 3]);
+        let mut finished = Finished { rows: zero, margins: [zero; 3] };
         let brief = outputs == Outputs::Joints && arm.model.effects.is_empty();
         let mut first_margins = [zero; 3];
         let mut step = 0;
@@ -210,19 +254,9 @@ impl Kernel {
             let wrist = at(&frames.origin[6], &axes, &self.wrist_mm);
             let flange = at(&frames.origin[6], &axes, &self.flange_mm);
             let missing = minus(&goal_flange, &flange);
-            let mut turn = [zero; 3];
-            let mut trace = zero;
-            for (here, there) in axes.iter().zip(&goal.axes) {
-                let c = cross(here, there);
-                for (t, c) in turn.iter_mut().zip(c) {
-                    *t += zero.splat(0.5) * c;
-                }
-                trace += dot(here, there);
-            }
+            let (turn, sensible) = missing_turn(&axes, &goal.axes);
             let residual_mm = dot(&missing, &missing).sqrt();
             let residual_rad = dot(&turn, &turn).sqrt();
-            // The sine of the missing angle is ambiguous beyond a quarter turn.
-            let sensible = (trace - one).positive();
             let converged = residual_mm.within(TOLERANCE_MM) * residual_rad.within(TOLERANCE_RAD) * sensible;
             if step == 0 {
                 first_margins = structure.margins(&frames, &wrist);
@@ -254,26 +288,18 @@ impl Kernel {
                     alive += -last;
                     ends = !alive.any_above(0.0);
                     if last.any_above(0.0) {
-                        let margins = structure.margins(&frames, &wrist);
-                        for k in 0..3 {
-                            finished_margins[k] += last * margins[k];
-                        }
-                        finished += last;
+                        finished.add(last, &structure.margins(&frames, &wrist));
                     }
                 }
             }
             if ends {
-                let open = one - finished;
-                let mut margins = structure.margins(&frames, &wrist);
-                for k in 0..3 {
-                    margins[k] = open * margins[k] + finished_margins[k];
-                }
+                let (open, margins) = finished.with_others(&structure.margins(&frames, &wrist));
                 return Solved {
                     mapped,
                     residual_mm,
                     residual_rad,
                     steps,
-                    converged: open * converged + finished,
+                    converged: open * converged + finished.rows,
                     singularity: match outputs {
                         Outputs::Full => factored.distance(&minus(&wrist, &flange), self.length_mm),
                         Outputs::Joints => factored.regular(self.length_mm),

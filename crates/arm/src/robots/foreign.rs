@@ -172,15 +172,7 @@ fn robot(
             "joint 3 is counted against the ground: link 3 turns by J3 and by what J2 takes back".to_owned(),
         );
         if let Some(limits) = &mut limits_deg {
-            let own = limits[2];
-            sum.push(SumLimit {
-                factors: [0.0, -along, 1.0, 0.0, 0.0, 0.0],
-                min_rad: own[0].to_radians(),
-                max_rad: own[1].to_radians(),
-            });
-            // As far as the sum allows.
-            let [low, high] = limits[1].map(|angle| along * angle);
-            limits[2] = [own[0] + low.min(high), own[1] + low.max(high)];
+            sum.push(limit_against_ground(limits, along));
             let name = if along < 0.0 { "J2 + J3" } else { "J3 − J2" };
             notes.push(format!("the file's range of joint 3 is taken as that of {name}"));
         }
@@ -209,13 +201,7 @@ fn robot(
             speed_deg_s: foreign.speed_deg_s,
             sum,
         },
-        flange: (fitted.flange != Pose::identity()).then(|| FlangeSheet {
-            position_mm: fitted.flange.translation.vector.into(),
-            quaternion_wxyz: {
-                let q = fitted.flange.rotation;
-                [q.w, q.i, q.j, q.k]
-            },
-        }),
+        flange: (fitted.flange != Pose::identity()).then(|| flange_sheet(&fitted.flange)),
         mounting: Mounting {
             gravity: gravity.map(zero_if_tiny).into(),
             plate_mm: (inside.rotation * -place).map(zero_if_tiny).into(),
@@ -232,6 +218,24 @@ fn robot(
     let robot = Robot::new(sheet, file)?;
     check_against_file(&robot, &foreign, &fitted, &map, file)?;
     Ok((robot, notes, visuals))
+}
+
+/// The range of joint 3 against the ground, as the file states it, as a range of the sum of two joints; `limits_deg` of joint 3 itself become
+/// as wide as that sum allows. `along` is 1 or −1, as joints 2 and 3 turn the same way or not.
+fn limit_against_ground(limits_deg: &mut [[f64; 2]; 6], along: f64) -> SumLimit {
+    let own = limits_deg[2];
+    let [low, high] = limits_deg[1].map(|angle| along * angle);
+    limits_deg[2] = [own[0] + low.min(high), own[1] + low.max(high)];
+    SumLimit {
+        factors: [0.0, -along, 1.0, 0.0, 0.0, 0.0],
+        min_rad: own[0].to_radians(),
+        max_rad: own[1].to_radians(),
+    }
+}
+
+fn flange_sheet(flange: &Pose) -> FlangeSheet {
+    let q = flange.rotation;
+    FlangeSheet { position_mm: flange.translation.vector.into(), quaternion_wxyz: [q.w, q.i, q.j, q.k] }
 }
 
 /// Masses of the links, with their centres in the frames of our links.
