@@ -299,6 +299,7 @@ impl Task<'_> {
         let reason = motion.reason();
         let machine = reason == Some(Reason::MachineCoordinates);
         let returns = reason == Some(Reason::ReferenceReturn);
+        let cycle = motion.kind == MotionKind::Unknown && reason == Some(Reason::Cycle);
         let restates = context.can_restate && known && slots.axes.iter().any(Option::is_some);
         let elsewhere = machine || returns || reason == Some(Reason::ExternalOnly);
         let states_axis = slots.axes.iter().any(Option::is_some);
@@ -309,7 +310,7 @@ impl Task<'_> {
             MotionKind::Unknown if reason == Some(Reason::UnknownWord) => {
                 states_any || slots.mode.is_some() || dialect == Dialect::Heidenhain
             }
-            MotionKind::Unknown => states_any || reason == Some(Reason::Cycle),
+            MotionKind::Unknown => states_any || cycle,
             _ => true,
         };
         let gets_words = context.can_restate && states_axis;
@@ -342,6 +343,11 @@ impl Task<'_> {
                     }
                 }
                 (Some(_), Some(true)) => state.pin_position(INCREMENT, axis),
+                // A canned cycle may return to the level at which it began (G98), whatever its words state.
+                (Some(_), _) if cycle && linear => {
+                    state.pin_origin(axis);
+                    state.position[axis] = was.union(state.origin[axis]);
+                }
                 (Some(_), _) => {
                     if linear {
                         state.pin_origin(axis);

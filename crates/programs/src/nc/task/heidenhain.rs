@@ -75,13 +75,9 @@ impl<'s> Interpreter<'_, 's> {
                 true
             }
             b"M" => {
-                // No motion: axis words are values of the M word.
-                match self.unknown_word(block) {
-                    Some((word, reason)) => self.list_unknown_word(block, &word, reason),
-                    None => {
-                        self.m_words(block);
-                        self.calls_cycle(block);
-                    }
+                // Axis words are values of the M word.
+                if self.only_m_words(block) {
+                    self.calls_cycle(block);
                 }
                 self.end_of_block(block);
                 true
@@ -93,12 +89,34 @@ impl<'s> Interpreter<'_, 's> {
         }
     }
 
+    /// The M words of a block without a motion of its own. False where one of them moves or is unknown.
+    fn only_m_words(&mut self, block: &Block<'_>) -> bool {
+        if let Some((word, reason)) = self.unknown_m_word(block) {
+            self.list_unknown_word(block, &word, reason);
+            return false;
+        }
+        self.m_words(block);
+        !self.m_motion(block)
+    }
+
+    /// The M words in the text of a block.
+    fn m_words_of_text(&mut self, block: &Block<'_>, words: &[&[u8]]) {
+        let number = |word: &&[u8]| std::str::from_utf8(word.strip_prefix(b"M")?).ok()?.parse().ok();
+        let m: Vec<u32> = words.iter().filter_map(number).collect();
+        if !m.is_empty() {
+            self.only_m_words(&Block { node: block.node, m, skippable: block.skippable, ..Block::default() });
+        }
+    }
+
     /// Blocks that are read as text and not word by word.
     fn other_block(&mut self, block: &Block<'_>, first: &Word<'_>, name: &[u8]) {
         let text = self.tree.source()[self.tree.range(first.first, first.end)].to_ascii_uppercase();
         let words: Vec<&[u8]> =
             text.split(|byte| byte.is_ascii_whitespace()).filter(|part| !part.is_empty()).collect();
         let second = words.get(1).copied().unwrap_or_default();
+        if name == b"STOP" || name == b"CYCL" && second == b"CALL" {
+            self.m_words_of_text(block, &words);
+        }
         match name {
             b"TOOL" if self.tool_block(&text, &words) => {}
             b"PLANE" | b"FUNCTION" | b"TRANS" if self.transformation_block(block, name, &words) => {}

@@ -227,7 +227,7 @@ impl Interpreter<'_, '_> {
             motion.own_reason = Some(Reason::UnsupportedPath);
         }
         motion.timed = !self.state.feed.per_minute && kind != MotionKind::Joint;
-        if motion.own_reason.is_none() && self.is_turn_at_a_feed(block, mode) {
+        if motion.reason().is_none() && self.is_turn_at_a_feed(block, mode) {
             motion.own_reason = Some(Reason::TurnAlone);
             motion.speed = None;
         }
@@ -377,13 +377,13 @@ impl Interpreter<'_, '_> {
             }
     }
 
-    /// Whether a block only turns the tool, at a feed in degrees per minute: a word of X, Y or Z would make it millimetres per minute.
+    /// Whether a block only turns the tool, at a feed in degrees per minute: a word of X, Y or Z would make it millimetres per minute. An 840D
+    /// (FGROUP) and a Heidenhain (M116, FUNCTION TCPM) may be set up otherwise, which the text need not tell.
     fn is_turn_at_a_feed(&self, block: &Block<'_>, mode: MotionMode) -> bool {
-        self.dialect.paren_comments()
-            && mode == MotionMode::Linear
+        mode == MotionMode::Linear
             && self.state.feed.per_minute
             && block.axes.iter().all(Option::is_none)
-            && block.abc.iter().any(Option::is_some)
+            && block.has_motion_words()
     }
 
     /// Whether U, V and W may be increments of X, Y and Z (lathes).

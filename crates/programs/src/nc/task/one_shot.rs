@@ -69,7 +69,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// M words that move or call. True if the axis words are not a modelled motion.
-    fn m_motion(&mut self, block: &Block<'_>) -> bool {
+    pub(super) fn m_motion(&mut self, block: &Block<'_>) -> bool {
         if self.dialect == Dialect::Heidenhain && block.m.contains(&140) {
             // Retraction along the tool axis to the end of the range.
             self.list_left(block, "M140", Reason::ReferenceReturn);

@@ -66,6 +66,20 @@ fn a_cycle_called_at_the_tool_position_is_listed() {
     }
 }
 
+/// The class: an M word that moves stands in a block that has no other motion.
+#[test]
+fn a_retraction_in_a_block_of_its_own_is_a_motion() {
+    for body in ["M140 MB MAX", "M140 MB+50 F500", "STOP M140 MB MAX", "CYCL CALL M140 MB MAX"] {
+        let found = super::default_deny::reasons(Heidenhain, &format!("{body}\nL Y+5\nL X+1 Y+1 Z+1"));
+        assert_eq!(found[found.len() - 2..], [left(PositionUnknown), None], "{body}");
+        assert!(found.contains(&left(ReferenceReturn)), "{body}: {found:?}");
+    }
+    check(Heidenhain, &[("STOP M104\nL X+1 Y+1 Z+1", &[left(UnknownWord), left(UnknownWord)])]);
+    check(Heidenhain, &[("STOP M5\nL X+5", &[None])]);
+    // The name of a program is no M word.
+    check(Heidenhain, &[("BEGIN PGM M140 MM\nL X+5", &[None])]);
+}
+
 #[test]
 fn targets_of_haas_jumps_are_joins() {
     let local = "N5 X5.\nN1000 Y20.\nG0 X-40. Y-40.\nM97 P1000\nM30";

@@ -50,6 +50,21 @@ fn unmodified_increments_and_position_reads_pin_the_motion_that_ends_there() {
     assert_eq!(first(Siemens, "R1=$AA_IM[X]\nG1 X=R1"), refused);
 }
 
+/// G98, the state at power-on, leads back to the level before the cycle.
+#[test]
+fn a_line_behind_a_canned_cycle_keeps_the_level_at_which_the_cycle_began() {
+    for (dialect, body, reason) in [
+        (Fanuc, "G81 X5. Y5. Z-3. R2. F200.\nG80\nG1 X20. Y0.\nX-20.", Reason::BeforeOmitted),
+        (Fanuc, "G98 G81 X5. Y5. Z-3. R2. F200.\nG3 X10. Y-10. R12.", Reason::BeforeIncrement),
+        (LinuxCnc, "G98 G81 X5 Y5 Z-3 R2 F200\nG80\nG1 X20 Y0", Reason::BeforeOmitted),
+    ] {
+        assert_eq!(first(dialect, body), Outcome::Refused(reason), "{body}");
+    }
+    // The line states where it ends, and how the tool is turned.
+    let stated = "G81 X5. Y5. Z-3. R2. F200.\nG80\nG1 X20. Y0. Z5. A180. B0. C0.";
+    assert_eq!(first(Fanuc, stated), Outcome::InPlace);
+}
+
 #[test]
 fn restated_or_independent_words_pin_nothing() {
     for body in [

@@ -276,4 +276,7 @@ fn a_turn_alone_gets_no_words() {
         let rapid = rewritten(dialect, "G1 X4. Y5. Z6. F600.\nG0 A175.");
         assert!(rapid.starts_with("G1 X4.5"), "{rapid}");
     }
+    let turn = left(TurnAlone);
+    check(Siemens, &[("X5\nA=175\nX6 A=176", &[None, turn, None])]);
+    check(Heidenhain, &[("L X+5\nL A+175\nL A+176 FMAX", &[None, turn, None])]);
 }
