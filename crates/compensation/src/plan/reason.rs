@@ -188,37 +188,6 @@ impl OutcomeReason {
         }
     }
 
-    /// Text of the reasons that pin an endpoint because a later unmodified motion starts there.
-    fn before_one_that_stays(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            OutcomeReason::HalfTurn { line } => write!(
-                f,
-                "on line {line} the tool turns by about half a turn: after the correction the controller might turn it the other way; put \
-                 a target between"
-            ),
-            OutcomeReason::StartOfUnchangedArc { line } => write!(
-                f,
-                "the circular motion of line {line} remains unmodified and starts here: from a corrected start it would be a \
-                 different circle"
-            ),
-            OutcomeReason::StartOfUnchangedCut { line } => write!(
-                f,
-                "the cut of line {line} remains unmodified and starts here: from a corrected start its first line would become a wedge"
-            ),
-            OutcomeReason::StartOfSingularPath { line } => write!(
-                f,
-                "the motion of line {line} remains unmodified and starts here: from a corrected start it would pass too close to \
-                 a singularity"
-            ),
-            OutcomeReason::StartOfLimitedPath { line, what } => write!(
-                f,
-                "the motion of line {line} remains unmodified and starts here: from a corrected start {what} would exceed its \
-                 limits on the way"
-            ),
-            _ => Ok(()),
-        }
-    }
-
     /// The reason without the figures of one motion, for counting.
     pub fn kind(&self) -> &'static str {
         match self {
@@ -370,10 +339,30 @@ impl fmt::Display for OutcomeReason {
                 "at the programmed speed joint {} exceeds its speed limit by a factor of {ratio:.2}",
                 joint + 1
             ),
-            OutcomeReason::StartOfUnchangedArc { .. }
-            | OutcomeReason::StartOfUnchangedCut { .. }
-            | OutcomeReason::StartOfSingularPath { .. }
-            | OutcomeReason::StartOfLimitedPath { .. } => self.before_one_that_stays(f),
+            OutcomeReason::HalfTurn { line } => write!(
+                f,
+                "on line {line} the tool turns by about half a turn: after the correction the controller might turn it the other way; put \
+                 a target between"
+            ),
+            OutcomeReason::StartOfUnchangedArc { line } => write!(
+                f,
+                "the circular motion of line {line} remains unmodified and starts here: from a corrected start it would be a \
+                 different circle"
+            ),
+            OutcomeReason::StartOfUnchangedCut { line } => write!(
+                f,
+                "the cut of line {line} remains unmodified and starts here: from a corrected start its first line would become a wedge"
+            ),
+            OutcomeReason::StartOfSingularPath { line } => write!(
+                f,
+                "the motion of line {line} remains unmodified and starts here: from a corrected start it would pass too close to \
+                 a singularity"
+            ),
+            OutcomeReason::StartOfLimitedPath { line, what } => write!(
+                f,
+                "the motion of line {line} remains unmodified and starts here: from a corrected start {what} would exceed its \
+                 limits on the way"
+            ),
             OutcomeReason::JointNotMeasured { joint, by_deg } => write!(
                 f,
                 "joint {} is {by_deg:.1}° outside the range in which the arm was measured",
