@@ -71,7 +71,7 @@ fn a_target_that_cannot_be_reached_keeps_its_cut_and_no_other() {
     let (done, bytes) = done(&module(&body), Cuts::Whole, 0.05);
     assert_eq!(statuses(&done), [Refused, Refused, Refused, Refused, Changed, Changed, Changed]);
     let because = |index: usize| done.plan.outcomes[index].reason().unwrap().to_string();
-    assert!(because(0).contains("line 6 remains unmodified: out of reach"), "{}", because(0));
+    assert!(because(0).contains("line 6 is not corrected: target is out of reach"), "{}", because(0));
     assert!(because(2).contains("reach"), "{}", because(2));
     let text = String::from_utf8(bytes).unwrap();
     for x in ["380", "390", "900", "400"] {

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 use truegrind_arm::inverse::InverseError;
+use truegrind_arm::model::Limited;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
@@ -148,7 +149,7 @@ fn reasons_are_counted_with_their_worst_and_their_first_lines() {
 status,motions,reason,worst,lines
 refused,1,correction exceeds the bound (--max-correction),12.345 mm,grind.mod 9
 refused,1,target is out of reach,,grind.mod 10
-flagged,2,joint 5 is outside the range in which the arm was measured,7.25°,grind.mod 7–8
+flagged,2,a joint is outside the range in which the arm was measured (joint 5),7.25°,grind.mod 7–8
 left,1,\"joint target: states joints, not a pose (--joint-targets rewrites it too)\",,grind.mod 5
 left,1,a program displacement or external axis offset is or may be active,,other.mod 3
 ";
@@ -173,15 +174,37 @@ fn lines_of_successive_motions_are_a_range_and_many_ranges_are_cut_short() {
 #[test]
 fn a_cut_that_stays_names_the_line_that_caused_it() {
     let (mut plan, listing, files) = example();
-    let part = |line| Some(OutcomeReason::PartOfCut { line, because: "out of reach" });
+    let part = |line| Some(OutcomeReason::PartOfCut { line, because: "target is out of reach" });
     plan.outcomes = vec![
         outcome(2, Status::Refused, part(9)),
         outcome(3, Status::Refused, part(9)),
         outcome(5, Status::Refused, Some(OutcomeReason::Step { line: 9, mm: 0.5 })),
     ];
     let text = csv::table(&view::reason_table(&plan, &listing, &files[..1]));
-    assert!(text.contains("of this cut is not corrected: out of reach (line 9)"), "{text}");
+    assert!(text.contains("of this cut is not corrected: target is out of reach (line 9)"), "{text}");
     assert!(text.contains("would exceed --tolerance (line 9),0.500 mm,10"), "{text}");
+}
+
+/// Each made a group of its own, since their sentences name lines: a page with as many rows.
+#[test]
+fn motions_that_are_kept_for_the_sake_of_others_share_a_group_whatever_the_line() {
+    let (mut plan, listing, files) = example();
+    let for_other: [fn(u32) -> OutcomeReason; 5] = [
+        |line| OutcomeReason::HalfTurn { line },
+        |line| OutcomeReason::StartOfUnchangedArc { line },
+        |line| OutcomeReason::StartOfUnchangedCut { line },
+        |line| OutcomeReason::StartOfSingularPath { line },
+        |line| OutcomeReason::StartOfLimitedPath { line, what: Limited::joint(2) },
+    ];
+    for (index, reason) in for_other.iter().enumerate() {
+        plan.outcomes =
+            (0..7).map(|motion| outcome(motion, Status::Refused, Some(reason(20 + motion)))).collect();
+        let table = view::reason_table(&plan, &listing, &files[..1]);
+        assert_eq!(table.rows.len(), 1, "{index}");
+        let text = csv::table(&table);
+        assert!(text.contains("lines 20, 21, 22, 23 and 3 more)"), "{text}");
+        assert_eq!(text.contains("joint 3, lines"), index == 4, "{text}");
+    }
 }
 
 #[test]
