@@ -422,7 +422,7 @@ fn what_is_left_shows_everywhere() {
     let (code, alone, err) = run("in/left.mod", &["-o", "left.mod"]);
     assert_eq!(code, 1, "{alone}{err}");
     assert!(
-        alone.contains("[warning]") && alone.contains("motions that are left stand beside corrected ones"),
+        alone.contains("[warning]") && alone.contains("between corrected motions and uncorrected neighbours"),
         "{alone}"
     );
     assert!(alone.contains("1 line or arc on which the tool may cut is left"), "{alone}");
