@@ -163,10 +163,9 @@ impl<'a> SolvedProgram<'a> {
             }
             refused.extend(more);
         }
-        // No agreement was reached: every round pinned more motions, so the whole program remains
-        // unmodified.
+        // Every round pinned more motions, so the whole program remains unmodified.
         for motion in 0..listing.motions.len() as u32 {
-            refused.entry(motion).or_insert(OutcomeReason::Inverse(InverseError::Abandoned));
+            refused.entry(motion).or_insert(OutcomeReason::NoConsistentPlan);
         }
         refused
     }

@@ -154,6 +154,8 @@ pub enum OutcomeReason {
     },
     /// An air move beside a cut that remains unmodified, whose lines would take their omitted axes from it.
     AirMoveAlone,
+    /// Every motion that was left out kept others from being corrected, until none was left to leave out.
+    NoConsistentPlan,
     /// An adjacent motion of the same cut remains unmodified, and the step to it would be too large.
     Step {
         /// Line of that motion, 1-based.
@@ -287,6 +289,9 @@ impl OutcomeReason {
                 "an air move next to a cut that is not corrected: correcting it would move the start of the cut, and the axes that its blocks \
                  omit"
             }
+            OutcomeReason::NoConsistentPlan => {
+                "no consistent plan was found: each motion that was not corrected kept others from being corrected; divide the program"
+            }
             OutcomeReason::Risk { .. } => {
                 "the correction would make this cut worse with a probability above --max-risk: the arm was not measured well enough here"
             }
@@ -298,7 +303,9 @@ impl OutcomeReason {
     /// What of the reason can be more or less, for the worst of several motions; `None` where nothing can or it is not finite.
     pub fn figure(&self) -> Option<Figure> {
         let figure = match *self {
-            OutcomeReason::Inverse(InverseError::Unreachable { beyond_mm }) => Figure::Length { mm: beyond_mm },
+            OutcomeReason::Inverse(InverseError::Unreachable { beyond_mm }) => {
+                Figure::Length { mm: beyond_mm }
+            }
             OutcomeReason::CorrectionTooLarge { mm }
             | OutcomeReason::PathDeviation { mm }
             | OutcomeReason::CornerDeviation { mm }

@@ -109,8 +109,9 @@ impl StepsToLeft {
         let lines = lines_of(listing, &self.motions).unwrap_or_default();
         let unknown = lines_of(listing, &self.of_unknown_size).filter(|_| self.largest_mm.is_some());
         let unknown = unknown.map(|lines| format!("; by how much at {lines} is unknown")).unwrap_or_default();
-        format!("the path steps {size} between corrected motions and uncorrected neighbours ({lines}{unknown})")
-            + &self.joint_targets(listing).unwrap_or_default()
+        format!(
+            "the path steps {size} between corrected motions and uncorrected neighbours ({lines}{unknown})"
+        ) + &self.joint_targets(listing).unwrap_or_default()
     }
 
     /// What is said of those that start at a joint target.

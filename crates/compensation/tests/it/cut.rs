@@ -205,7 +205,10 @@ fn a_step_of_unknown_size_is_a_step() {
     };
     assert_eq!(of([Some(0.01); 3]), None);
     let some = of([Some(0.3), None, None]).unwrap();
-    assert_eq!((some.motions.as_slice(), some.of_unknown_size.as_slice()), ([0, 2].as_slice(), [2].as_slice()));
+    assert_eq!(
+        (some.motions.as_slice(), some.of_unknown_size.as_slice()),
+        ([0, 2].as_slice(), [2].as_slice())
+    );
     let text = some.sentence(&listing);
     assert!(text.contains("up to 0.30 mm") && text.contains("by how much at line 6 is unknown"), "{text}");
     let none = of([None; 3]).unwrap();
@@ -231,7 +234,10 @@ fn lines_from_joint_targets_that_are_left_are_counted() {
     let begins = [joint("tool0"), a.clone(), b.clone()];
     let (found, text) = steps(&begins, false);
     assert_eq!(found, Some([vec![1], vec![1]]));
-    assert!(text.contains("line 5 starts at an uncorrected joint target") && text.contains("--joint-targets"), "{text}");
+    assert!(
+        text.contains("line 5 starts at an uncorrected joint target") && text.contains("--joint-targets"),
+        "{text}"
+    );
     assert_eq!(steps(&begins, true).0, None);
     // In the middle, with another tool.
     assert_eq!(steps(&[a.clone(), joint("long"), b.clone(), c.clone()], false).0, Some([vec![2], vec![2]]));

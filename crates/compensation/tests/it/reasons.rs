@@ -64,6 +64,8 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::PartOfCut { .. } => "part of cut",
         OutcomeReason::Step { .. } => "step",
         OutcomeReason::AirMoveAlone => "air-move-alone",
+        // No program is known that needs so many rounds.
+        OutcomeReason::NoConsistentPlan => "no consistent plan",
         // tests/it/placement.rs.
         OutcomeReason::Risk { .. } => "risk",
         OutcomeReason::NotCovered { .. } => "not covered",
