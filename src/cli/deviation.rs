@@ -1,5 +1,6 @@
 //! `truegrind deviation PROGRAM… --model MODEL.toml…`: the deviation report, without rewriting.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
@@ -382,12 +383,15 @@ pub(super) fn why_no_point(reports: &[PathReport]) -> String {
         return "it has no motion of the tool".to_owned();
     }
     let mut reasons: Vec<(&str, usize, u32)> = Vec::new();
+    // Sentences that name lines or sizes are many.
+    let mut index_of: HashMap<&str, usize> = HashMap::new();
     for motion in motions {
-        let reason = motion.reason.as_deref().unwrap_or("the program text does not tell where it leads");
-        match reasons.iter_mut().find(|(known, ..)| *known == reason) {
-            Some((_, count, _)) => *count += 1,
-            None => reasons.push((reason, 1, motion.line)),
-        }
+        let reason = motion.reason.as_deref().unwrap_or("its target is not in the program text");
+        let index = *index_of.entry(reason).or_insert_with(|| {
+            reasons.push((reason, 0, motion.line));
+            reasons.len() - 1
+        });
+        reasons[index].1 += 1;
     }
     reasons.sort_by_key(|(_, count, _)| std::cmp::Reverse(*count));
     let told: Vec<String> = reasons

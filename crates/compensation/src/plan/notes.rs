@@ -1,5 +1,7 @@
 //! Notes of a plan: what was not checked, what was assumed, and how backlash and payload enter.
 
+use std::collections::HashMap;
+
 use crate::arms::Arms;
 use crate::condition::payload::{is_load_dependent, payload_at};
 use crate::deviation::Status;
@@ -147,7 +149,6 @@ pub(crate) fn unchecked_notes(
     out
 }
 
-/// Calls of routines that are in none of the files, and what is assumed of them.
 /// NC files of which nothing shows the control, on which the meaning of X, Y, Z depends.
 fn open_control_note(listing: &Listing) -> Option<String> {
     let lines = numbered(listing, listing.open_controls.iter().copied())?;
@@ -158,16 +159,18 @@ fn open_control_note(listing: &Listing) -> Option<String> {
     ))
 }
 
+/// Calls of routines that are in none of the files, and what is assumed of them.
 fn outside_calls_note(listing: &Listing) -> Option<String> {
     /// How many routines are named.
     const NAMED: usize = 5;
     let mut routines: Vec<(&str, Vec<Place>)> = Vec::new();
+    let mut index_of: HashMap<String, usize> = HashMap::new();
     for call in &listing.outside_calls {
-        let name = call.name.as_str();
-        match routines.iter_mut().find(|(other, _)| other.eq_ignore_ascii_case(name)) {
-            Some((_, places)) => places.push(call.place),
-            None => routines.push((name, vec![call.place])),
-        }
+        let index = *index_of.entry(call.name.to_ascii_lowercase()).or_insert_with(|| {
+            routines.push((call.name.as_str(), Vec::new()));
+            routines.len() - 1
+        });
+        routines[index].1.push(call.place);
     }
     let named = routines.iter().take(NAMED).filter_map(|(name, places)| {
         Some(format!("{name} ({})", numbered(listing, places.iter().copied())?))

@@ -3,6 +3,8 @@
 //! Each program's targets are compared in its own tool and work object: a program whose tool, work object or displacement is another one,
 //! or that has motions of its own, reaches the numbers of the original elsewhere, and its figures mean nothing.
 
+use std::collections::HashMap;
+
 use nalgebra::Vector3;
 
 use super::executed_end::ExecutedEnd;
@@ -31,14 +33,19 @@ pub(super) struct Compared<'a> {
 
 /// What differs, each with the motions of the rewritten program where it does.
 #[derive(Default)]
-struct Found(Vec<(String, Vec<u32>)>);
+struct Found {
+    entries: Vec<(String, Vec<u32>)>,
+    /// Where a sentence stands: a size in it makes nearly each its own.
+    index_of: HashMap<String, usize>,
+}
 
 impl Found {
     fn push(&mut self, motion: usize, what: String) {
-        match self.0.iter_mut().find(|(known, _)| *known == what) {
-            Some((_, motions)) => motions.push(motion as u32),
-            None => self.0.push((what, vec![motion as u32])),
-        }
+        let index = *self.index_of.entry(what).or_insert_with_key(|what| {
+            self.entries.push((what.clone(), Vec::new()));
+            self.entries.len() - 1
+        });
+        self.entries[index].1.push(motion as u32);
     }
 }
 
@@ -63,7 +70,7 @@ impl Compared<'_> {
             }
         }
         self.find_added(&mut found);
-        sentences.extend(found.0.into_iter().map(|(what, motions)| {
+        sentences.extend(found.entries.into_iter().map(|(what, motions)| {
             let lines = lines_of(rewritten, &motions).unwrap_or_default();
             format!("{lines}: {what}")
         }));
