@@ -40,7 +40,7 @@ pub struct Compensated {
 impl Compensated {
     /// Whether a motion is rewritten.
     pub fn changed(&self) -> bool {
-        self.plan.outcomes.iter().any(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
+        self.plan.outcomes.iter().any(|outcome| outcome.status.is_written())
     }
 }
 

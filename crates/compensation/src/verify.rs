@@ -26,7 +26,7 @@ use truegrind_arm::model::{Joints, Model};
 use truegrind_math::se3::Pose;
 use truegrind_math::work::checkpoint;
 use truegrind_programs::motion::load::Loads;
-use truegrind_programs::motion::{Listing, MotionKind, Reason, Role, TargetValue};
+use truegrind_programs::motion::{Listing, MotionKind, Reason, TargetValue};
 use truegrind_surfaces::Surface;
 
 /// Commanded end of a motion.
@@ -231,13 +231,12 @@ fn condition_indices(
         .collect();
     for there in sent {
         let motion = &listing.motions[there.motion];
-        let via = motion.targets.iter().find(|target| target.role == Role::Via);
         stops[there.motion] = MotionEnd::At(ReachedEnd {
             motion,
             frames_index: there.frames_index,
             commanded: there.commanded,
             joints: there.joints,
-            via: via.and_then(|via| via.value.ok()?.cartesian().map(|t| t.pose())),
+            via: motion.via().and_then(|via| via.value.ok()?.cartesian().map(|t| t.pose())),
             links: None,
             as_joints: false,
             may_insert: false,

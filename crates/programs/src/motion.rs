@@ -383,6 +383,11 @@ impl Motion {
         self.targets.iter().rev().find(|target| target.role == Role::To)
     }
 
+    /// The circle point of a circular motion.
+    pub fn via(&self) -> Option<&MotionTarget> {
+        self.targets.iter().find(|target| target.role == Role::Via)
+    }
+
     /// The Cartesian target at the end of the motion, if it is known.
     pub fn cartesian_end(&self) -> Option<RobTarget> {
         self.to()?.value.ok()?.cartesian().copied()

@@ -80,10 +80,7 @@ impl Row {
         let mut counts = [0; 4];
         plan.outcomes.iter().for_each(|outcome| counts[outcome.status as usize] += 1);
         let count = |motion_status: MotionStatus| counts[motion_status as usize];
-        let written = |motion_status: MotionStatus| {
-            matches!(motion_status, MotionStatus::Changed | MotionStatus::Flagged)
-        };
-        let after = plan.outcomes.iter().filter(|o| written(o.status)).filter_map(|o| o.after_mm.get());
+        let after = plan.outcomes.iter().filter(|o| o.status.is_written()).filter_map(|o| o.after_mm.get());
         // Before and after of the same motions: those of which most is expected to remain.
         let found = placement::before_and_after(plan, listing).into_iter();
         let most = found.max_by(|a, b| a.expected_mm.unwrap_or(0.0).total_cmp(&b.expected_mm.unwrap_or(0.0)));

@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 
 use super::table::{Column, Table};
 use truegrind_calibration::identification::verdict::percent_of;
-use truegrind_compensation::deviation::Status;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
@@ -186,7 +185,7 @@ pub fn left_at_risk(plan: &Plan) -> (usize, usize) {
 }
 
 fn rewritten(plan: &Plan) -> impl Iterator<Item = &MotionOutcome> {
-    plan.outcomes.iter().filter(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
+    plan.outcomes.iter().filter(|outcome| outcome.status.is_written())
 }
 
 /// Largest uncorrected deviation of all motions (mm).
@@ -237,11 +236,15 @@ pub fn risk(plan: &Plan) -> Option<String> {
         plan.cuts.iter().filter(|cut| cut.corrected).map(|cut| cut.probability_of_harm).fold(0.0, f64::max);
     Some(format!(
         "probability that the corrected cuts together deviate more than the uncorrected ones: {all}; for any single cut: {}",
-        match percent_of(largest) {
-            small if small.starts_with("under") => small,
-            other => format!("at most {other}"),
-        }
+        at_most(largest)
     ))
+}
+
+/// A probability as an upper bound.
+fn at_most(probability: f64) -> String {
+    let percent = percent_of(probability);
+    // At both ends it is a bound by itself.
+    if (0.001..=0.999).contains(&probability) { format!("at most {percent}") } else { percent }
 }
 
 fn remedy_json(remedy: &Remedy, what: &str) -> Value {

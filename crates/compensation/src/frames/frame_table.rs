@@ -199,7 +199,7 @@ impl FrameTable {
                 Some(Carries::Base) => self.base_of_blocks = index,
                 Some(Carries::Other) => {}
                 None => {
-                    let lines = numbered(listing, [*place].into_iter()).unwrap_or_default();
+                    let lines = numbered(&listing.files, [*place].into_iter()).unwrap_or_default();
                     self.unstated_axes.push(letter);
                     self.assumed.push(format!(
                         "axis {letter} ({lines}): assumed not to carry the robot's base; state what it carries (cell file, [[external]])"

@@ -4,7 +4,6 @@ use std::collections::HashMap;
 
 use crate::arms::Arms;
 use crate::condition::payload::{is_load_dependent, payload_at};
-use crate::deviation::Status;
 use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
 use crate::plan::MotionOutcome;
@@ -151,7 +150,7 @@ pub(crate) fn unchecked_notes(
 
 /// NC files of which nothing shows the control, on which the meaning of X, Y, Z depends.
 fn open_control_note(listing: &Listing) -> Option<String> {
-    let lines = numbered(listing, listing.open_controls.iter().copied())?;
+    let lines = numbered(&listing.files, listing.open_controls.iter().copied())?;
     Some(format!(
         "no word shows for which control the program is written: it is read as ISO 6983 with the tip of the tool at X Y Z, and numbers \
          without a decimal point as mm (from {lines}); a Fanuc reads both otherwise. State the control in a comment of the program: \
@@ -173,7 +172,7 @@ fn outside_calls_note(listing: &Listing) -> Option<String> {
         routines[index].1.push(call.place);
     }
     let named = routines.iter().take(NAMED).filter_map(|(name, places)| {
-        Some(format!("{name} ({})", numbered(listing, places.iter().copied())?))
+        Some(format!("{name} ({})", numbered(&listing.files, places.iter().copied())?))
     });
     let named: Vec<String> = named.collect();
     let more = routines.len().saturating_sub(NAMED);
@@ -203,8 +202,7 @@ fn grams(kg: f64) -> f64 {
 pub(crate) fn unknown_loads(arms: &Arms<'_>, options: &Options, outcomes: &[MotionOutcome]) -> usize {
     let load_dependent = arms.estimated.arm().model.effects.iter().any(is_load_dependent);
     let Some(loads) = options.loads.as_ref().filter(|_| load_dependent) else { return 0 };
-    let is_corrected = |outcome: &&MotionOutcome| matches!(outcome.status, Status::Changed | Status::Flagged);
-    let corrected = outcomes.iter().filter(is_corrected);
+    let corrected = outcomes.iter().filter(|outcome| outcome.status.is_written());
     corrected.filter(|outcome| loads.grip(outcome.motion as usize) == Grip::Unknown).count()
 }
 

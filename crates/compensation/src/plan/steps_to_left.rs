@@ -75,7 +75,7 @@ impl StepsToLeft {
         for change in changes {
             let motion = &listing.motions[change.motion as usize];
             let (status, _, before_mm) = outcome(change.motion as usize);
-            if !is_path(motion) || !matches!(status, Status::Changed | Status::Flagged) {
+            if !is_path(motion) || !status.is_written() {
                 continue;
             }
             // A step of unknown size may be one above the tolerance.

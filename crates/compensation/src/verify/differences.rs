@@ -11,7 +11,7 @@ use super::executed_end::ExecutedEnd;
 use crate::line_list::lines_of;
 use crate::segment::curve::Curve;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Frame, Listing, Motion, MotionKind, Role, Tool, WorkObject};
+use truegrind_programs::motion::{Frame, Listing, Motion, MotionKind, Tool, WorkObject};
 
 /// How much farther than its neighbours an inserted target may be off the intended path (mm): a program may be verified with another
 /// model than the one that corrected it.
@@ -113,10 +113,7 @@ impl Compared<'_> {
 
     /// How far a circle point is moved (mm), where it is not as the end of its motion is.
     fn circle_point_moved_mm(&self, index: usize, partner: usize) -> Option<f64> {
-        let via = |motion: &Motion| {
-            let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
-            Some(via.value.ok()?.cartesian()?.pose().translation.vector)
-        };
+        let via = |motion: &Motion| Some(motion.via()?.value.ok()?.cartesian()?.pose().translation.vector);
         let [was, is] = [via(&self.original.motions[index])?, via(&self.rewritten.motions[partner])?];
         let end = correction(self.before[index]?, self.after[partner]?);
         let moved = is - was;
@@ -185,8 +182,7 @@ fn way(motion: &Motion, from: Pose, to: Pose) -> Option<Curve> {
     if motion.kind == MotionKind::Linear {
         return Some(Curve::line(from, to));
     }
-    let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
-    Curve::round(from, &via.value.ok()?.cartesian()?.pose(), to, motion)
+    Curve::round(from, &motion.via()?.value.ok()?.cartesian()?.pose(), to, motion)
 }
 
 /// Distance of a pose from a way between its ends (mm).

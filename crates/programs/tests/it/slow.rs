@@ -161,8 +161,7 @@ fn assert_not_quadratic(name: &str, [short, long]: [String; 2]) {
 /// Each label looked for its return to the end of the file, and each program for an earlier one.
 #[test]
 fn twenty_thousand_labels_or_programs_take_four_times_as_long_as_five_thousand() {
-    let labels =
-        |n: usize| format!("0 BEGIN PGM A MM\n{}END PGM A MM\n", times(n, |i| format!("LBL {i}\n")));
+    let labels = |n: usize| format!("0 BEGIN PGM A MM\n{}END PGM A MM\n", times(n, |i| format!("LBL {i}\n")));
     let programs = |n: usize| times(n, |i| format!("O{i}\nM99\n"));
     assert_not_quadratic("labels.h", [5_000, 20_000].map(labels));
     assert_not_quadratic("programs.nc", [5_000, 20_000].map(programs));

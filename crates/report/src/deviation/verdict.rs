@@ -5,6 +5,8 @@ use super::words::{decimals, meaning};
 use crate::document::Verdict;
 use crate::status::Status;
 use truegrind_compensation::deviation::{PathPoint, PathReport, Status as MotionStatus};
+use truegrind_compensation::line_list::numbered;
+use truegrind_programs::motion::Place;
 
 /// A report with its largest deviation (mm) before and after correction.
 type Judged<'a> = (&'a PathReport, f64, f64);
@@ -150,32 +152,15 @@ fn worse(report: &PathReport, before: f64, after: f64) -> Option<String> {
     bent(report).filter(|_| after > STAYS * before).map(|[before, after]| bent_words(before, after))
 }
 
-/// Lines that are listed.
-const MAX_LINES: usize = 8;
-
 /// What is said of steps between corrected points and others.
 fn steps(report: &PathReport) -> Option<String> {
     let steps = report.steps();
-    let [_, ..] = steps.points.as_slice() else { return None };
-    let mut lines: Vec<String> = steps.points.iter().map(|point| place(report, point)).collect();
-    lines.dedup();
-    let more = if lines.len() > MAX_LINES { " and more" } else { "" };
-    lines.truncate(MAX_LINES);
-    let word = if lines.len() == 1 { "line" } else { "lines" };
+    let place = |point: &&PathPoint| Place { file: point.file, line: point.line, column: 0 };
+    let lines = numbered(&report.files, steps.points.iter().map(place))?;
     Some(format!(
-        "under {} the path has steps of up to {:.3} mm between points that are corrected and neighbours that are not ({word} {}{more})",
-        report.model,
-        steps.largest_mm,
-        lines.join(", ")
+        "{}: the path steps by up to {:.3} mm between corrected points and uncorrected neighbours ({lines})",
+        report.model, steps.largest_mm
     ))
-}
-
-/// The line of a point, with its file where there are several.
-fn place(report: &PathReport, point: &PathPoint) -> String {
-    match report.files.get(point.file as usize) {
-        Some(file) => format!("{} of {file}", point.line),
-        None => point.line.to_string(),
-    }
 }
 
 /// Deviation before and after.

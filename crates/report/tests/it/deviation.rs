@@ -484,7 +484,7 @@ fn a_path_that_is_corrected_in_part_is_judged_as_a_whole() {
     assert!(text.contains("[failed]"), "{text}");
     assert!(text.contains("bends the path: its shape goes from 0.0"), "{text}");
     assert!(
-        text.contains("steps of up to 2.0") && text.contains("neighbours that are not (line 14)"),
+        text.contains("steps by up to 2.0") && text.contains("uncorrected neighbours (line 14)"),
         "{text}"
     );
     let table = view::registered_table(std::slice::from_ref(&part));

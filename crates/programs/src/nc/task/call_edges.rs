@@ -160,7 +160,8 @@ impl CallEdges {
                 behind_it = BehindIt::default();
             }
             let whole = behind_it.last.map_or(point.behind, |last| last.max(point.behind));
-            let extent = |until: Until| Extent { end: until.end.unwrap_or(whole), has_calls: until.has_calls };
+            let extent =
+                |until: Until| Extent { end: until.end.unwrap_or(whole), has_calls: until.has_calls };
             out[at] = match &point.flow {
                 FlowPoint::File { .. } => Some(extent(behind_it.file)),
                 FlowPoint::Program(_) => Some(extent(behind_it.program)),

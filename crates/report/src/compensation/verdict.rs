@@ -144,15 +144,11 @@ fn paths(plan: &Plan, listing: &Listing) -> [usize; 3] {
         if is_path(&listing.motions[outcome.motion as usize]) {
             let right = outcome.reason() == Some(OutcomeReason::NoChange);
             found[0] += 1;
-            found[1] += usize::from(right || is_written(outcome.status));
+            found[1] += usize::from(right || outcome.status.is_written());
             found[2] += usize::from(!right && outcome.status == MotionStatus::Left);
         }
     }
     found
-}
-
-fn is_written(status: MotionStatus) -> bool {
-    matches!(status, MotionStatus::Changed | MotionStatus::Flagged)
 }
 
 /// Whether the program has cuts and all of them are unchanged.
