@@ -316,7 +316,7 @@ impl DeviationContext<'_> {
             // Rewriting inserts motions and removes none.
             if moves < intended {
                 bail!(
-                    "{name}: it has {moves} motions, and the program of --intended {intended}: give the program from which it was rewritten"
+                    "{name}: {moves} motions, but the program of --intended has {intended}: give the program from which it was rewritten"
                 );
             }
         }
@@ -324,8 +324,7 @@ impl DeviationContext<'_> {
             && let Some(mark) = task.listing().marks.iter().flatten().next()
         {
             bail!(
-                "{name}: it was corrected with model {}, so its targets are not where the tool is meant to go: give the program from which \
-                 it was rewritten too (--intended)",
+                "{name}: already corrected with model {}; give the original program as well (--intended)",
                 mark.model
             );
         }
@@ -416,8 +415,8 @@ fn refuse_unrelated(name: &str, reports: &[PathReport]) -> anyhow::Result<()> {
         .max_by(|(_, a), (_, b)| a.total_cmp(b));
     if let Some((line, mm)) = farthest.filter(|(_, mm)| *mm > OTHER_TARGET_MM) {
         bail!(
-            "{name}: it ends {mm:.0} mm from the target of line {line} of the program of --intended, further than any correction: give the \
-             program from which it was rewritten"
+            "{name}: it ends {mm:.0} mm from the target of line {line} of the program of --intended, further than any correction: give the program \
+             from which it was rewritten"
         );
     }
     Ok(())

@@ -137,7 +137,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
                 shape_sigma_mm: None,
                 outside: acting_arm.knowledge.and_then(|k| k.region.outside(&joints)),
                 status: if second.is_some() && !same { Status::Changed } else { Status::Left },
-                reason: same.then(|| "the rewritten program has it as the original".to_owned()),
+                reason: same.then(|| "same as in the original".to_owned()),
             }
         })
         .collect();

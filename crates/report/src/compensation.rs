@@ -75,8 +75,7 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
         table.push(row);
     }
     table.notes.push(
-        "before: deviation of the tool at the end of the uncorrected motion. remainder: predicted remainder, which rounding and \
-         inverse kinematics leave under the same model; a motion that is left or refused keeps its deviation. 1σ: predicted from \
+        "before: deviation of the tool at the end of the uncorrected motion. remainder: what the model predicts is left after rounding and inverse kinematics; uncorrected motions keep their deviation. 1σ: predicted from \
          the covariance of the model, for the shape of the cut (after the best rigid registration of all cuts on the part) and for its placement. between: \
          deviation from the intended path between the targets. Inserted: number of targets inserted before the end of the motion."
             .to_owned(),

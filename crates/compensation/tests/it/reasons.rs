@@ -440,7 +440,7 @@ fn calls_of_routines_in_no_file_are_noted_with_what_is_assumed_of_them() {
     let plan = planned(source.as_bytes(), &known(), &Cell::default(), &fine());
     let notes = plan.notes.join("\n");
     assert!(
-        notes.contains("in none of the files are called: SetShift (lines 4, 6); they are assumed"),
+        notes.contains("routines missing from the files are called: SetShift (lines 4, 6). They are assumed"),
         "{notes}"
     );
     assert!(!notes.contains("SetDO"), "{notes}");

@@ -33,43 +33,42 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
         (0, _) => (Status::Bad, "Nothing could be corrected"),
         _ if no_cut(plan, listing) => (
             Status::Warning,
-            "No cut is corrected, only motions between cuts: the deviation of the workpiece stays",
+            "No cut was corrected, only moves between cuts: the workpiece deviates as before",
         ),
         _ if is_again(listing) => (
             Status::Warning,
-            "Corrected once more: the corrections add up, and what deviates now is not known from this program",
+            "Corrected a second time: both corrections add up, so the remaining deviation cannot be stated",
         ),
-        (_, 0) if left > 0 => (
-            Status::Warning,
-            "Corrected, except for cuts where the model is too uncertain: these are unchanged",
-        ),
+        (_, 0) if left > 0 => {
+            (Status::Warning, "Corrected, except for cuts where the model is too uncertain")
+        }
         (_, 0) if !listing.opaque.is_empty() => (
             Status::Warning,
             "Corrected, but parts of the program could not be read: check them before running the program",
         ),
         (_, 0) if plan.steps.is_some() => (
             Status::Warning,
-            "Corrected, but the path has steps beside motions that are left: check them before running the program",
+            "Corrected, but the path steps next to uncorrected motions: check them before running the program",
         ),
         (_, 0) if !listing.open_controls.is_empty() => (
             Status::Warning,
-            "Corrected for a control that is not stated: state it before running the program",
+            "Corrected, but nothing says which control the program is for: state it before running the program",
         ),
         (_, 0) if !plan.unstated_axes.is_empty() => (
             Status::Warning,
-            "Corrected for a robot that stands still: state what the external axes carry before running the program",
+            "Corrected as if the robot base never moves: state what the external axes carry before running the program",
         ),
         (_, 0) if plan.unknown_loads > 0 => (
             Status::Warning,
-            "Corrected for the tool alone where the load is known only at run time (GripLoad): check it before running the program",
+            "Corrected, but where GripLoad sets the load at run time only the tool is counted: check these motions before running the program",
         ),
         (_, 0) if paths(plan, listing)[2] > 0 => (
             Status::Warning,
-            "Corrected, except for lines or arcs that are left: there the workpiece deviates as before",
+            "Corrected, except for some lines or arcs, where the workpiece deviates as before",
         ),
         (_, 0) if left_cycles(listing) > 0 => (
             Status::Warning,
-            "Corrected, except for canned cycles: their holes and pockets stay where they are, beside corrected paths",
+            "Corrected, except for canned cycles: their holes and pockets keep their old error next to corrected paths",
         ),
         (_, 0) if !is_written => {
             (Status::Good, "All correctable motions would be corrected; nothing was written")
@@ -86,19 +85,21 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
     reasons.extend(match left_cycles(listing) {
         1.. if written == 0 => None,
         0 => None,
-        1 => Some("1 canned cycle is left: its motions are not in the program".to_owned()),
-        count => Some(format!("{count} canned cycles are left: their motions are not in the program")),
+        1 => Some("1 canned cycle is not corrected: its motions are not in the program".to_owned()),
+        count => {
+            Some(format!("{count} canned cycles are not corrected: their motions are not in the program"))
+        }
     });
     if left > 0 {
         reasons.push(format!(
-            "{left} of {cuts} cuts are unchanged, since their correction makes them worse with a probability above --max-risk; measuring \
-             more poses near them improves the model (`truegrind plan`)"
+            "{left} of {cuts} cuts are not corrected, since that would make them worse with a probability above --max-risk. Measure more poses near \
+             them (`truegrind plan`)"
         ));
     }
     reasons.extend(placement::risk(plan).filter(|_| !is_again(listing)));
     if refused > 0 && written > 0 {
         reasons.push(
-            "refused motions are unchanged: the path has a step of the size of the correction between them and their corrected neighbours"
+            "refused motions are not corrected: between them and their corrected neighbours the path steps by the size of the correction"
                 .to_owned(),
         );
     }
@@ -109,8 +110,8 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
     if steps > 0 {
         let (motions, own) = if steps == 1 { ("motion is", "its") } else { ("motions are", "their") };
         reasons.push(format!(
-            "{steps} correctable {motions} unchanged, since another motion of {own} cut cannot be corrected: correcting a part of a cut \
-             would leave a step in the workpiece"
+            "{steps} correctable {motions} not corrected, since another motion of {own} cut cannot be: correcting a part of a cut would leave a step \
+             in the workpiece"
         ));
     }
     if !listing.opaque.is_empty() {
@@ -137,7 +138,7 @@ fn count_reason(plan: &Plan, is: impl Fn(&OutcomeReason) -> bool) -> usize {
     plan.outcomes.iter().filter(|outcome| outcome.reason.as_deref().is_some_and(&is)).count()
 }
 
-/// Lines and arcs on which the tool may cut: how many, how many of them are right or corrected, and how many are left.
+/// Lines and arcs on which the tool may cut: how many, how many of them are right or corrected, and how many are uncorrected.
 fn paths(plan: &Plan, listing: &Listing) -> [usize; 3] {
     let mut found = [0; 3];
     for outcome in &plan.outcomes {
@@ -157,16 +158,12 @@ fn no_cut(plan: &Plan, listing: &Listing) -> bool {
     all > 0 && corrected == 0 || !plan.cuts.is_empty() && plan.cuts.iter().all(|cut| !cut.corrected)
 }
 
-/// What is said of lines and arcs that are left beside corrected motions; `None` without any.
+/// Sentence on uncorrected lines and arcs; `None` without any.
 fn left_paths(plan: &Plan, listing: &Listing) -> Option<String> {
     match paths(plan, listing) {
         [_, _, 0] => None,
-        [_, _, 1] => {
-            Some("1 line or arc on which the tool may cut is left: there the deviation stays".to_owned())
-        }
-        [_, _, left] => Some(format!(
-            "{left} lines or arcs on which the tool may cut are left: there the deviation stays"
-        )),
+        [_, _, 1] => Some("1 line or arc on which the tool may cut is not corrected".to_owned()),
+        [_, _, left] => Some(format!("{left} lines or arcs on which the tool may cut are not corrected")),
     }
 }
 
@@ -188,8 +185,7 @@ fn is_again(listing: &Listing) -> bool {
 fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
     if is_again(listing) {
         return vec![
-            "the program was corrected before (mark in the file): its numbers are not those that were intended, so deviations before and \
-             after and the risk cannot be stated; correct the original program instead"
+            "this program was already corrected (its mark says so), so deviation and risk cannot be stated; correct the original program instead"
                 .to_owned(),
         ];
     }
@@ -198,8 +194,8 @@ fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
         let unknown = plan.outcomes.iter().filter(|outcome| outcome.before_mm.get().is_none()).count();
         let where_known = match unknown {
             0 => String::new(),
-            1 => " where it is known (not at 1 motion)".to_owned(),
-            _ => format!(" where it is known (not at {unknown} motions)"),
+            1 => "; unknown at 1 motion".to_owned(),
+            _ => format!("; unknown at {unknown} motions"),
         };
         let uncorrected =
             |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm{where_known}");

@@ -40,8 +40,8 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
         let only_shape = only_shape(report);
         if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape {
             reasons.push(format!(
-                "{} corrects the shape of the path, from {before:.3} to {after:.3} mm RMS after the best rigid registration, and not where \
-                 it lies as a whole: {place_mm:.3} mm RMS (`compensate --placement` decides that)",
+                "{} corrects the shape of the path ({before:.3} → {after:.3} mm RMS after the best rigid registration) but not its placement: as it \
+                 lies, it deviates by {place_mm:.3} mm RMS (see `compensate --placement`)",
                 report.model
             ));
         } else if let Some(words) = worse(report, *before, *after) {
@@ -69,20 +69,17 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
         {
             status = at_least_warning(status);
             reasons.push(format!(
-                "under {} the predicted 1σ of {sigma:.3} mm exceeds the deviation that it corrects, {rms:.3} mm RMS: the \
-                 model does not know enough here to say that the correction helps",
+                "{}: the predicted 1σ, {sigma:.3} mm, exceeds the deviation to correct, {rms:.3} mm RMS: the model cannot say whether the correction \
+                 helps here",
                 report.model
             ));
         }
     }
     if let Some(missing) = reports.iter().find_map(|report| report.missing.as_ref()) {
         status = at_least_warning(status);
-        let one = missing.motions.len() == 1;
-        let (motions, lead, them) =
-            if one { ("motion has", "it leads", "it") } else { ("motions have", "they lead", "them") };
+        let motions = if missing.motions.len() == 1 { "motion has" } else { "motions have" };
         reasons.push(format!(
-            "{} {motions} no deviation, since the program text does not tell where {lead} or the arm does not reach {them} ({}; --csv gives \
-             the reasons)",
+            "{} {motions} no known deviation: the target is not in the program text, or out of reach ({}; reasons in --csv)",
             missing.motions.len(),
             missing.lines
         ));
@@ -101,9 +98,8 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
     Verdict::new(status, headline(reports, &judged), reasons)
 }
 
-/// What is said of a program that is not the intended one with corrected targets.
-const OTHER_PROGRAM: &str = "The program differs from the intended one by more than a correction: the deviations after are not those of \
-    a corrected program";
+/// Headline for a program that is not the original with corrected targets.
+const OTHER_PROGRAM: &str = "The program differs from the original in more than corrected targets, so its deviations after correction mean nothing";
 
 /// Differences that are listed.
 const MAX_DIFFERENCES: usize = 10;
@@ -152,7 +148,7 @@ fn worse(report: &PathReport, before: f64, after: f64) -> Option<String> {
     bent(report).filter(|_| after > STAYS * before).map(|[before, after]| bent_words(before, after))
 }
 
-/// What is said of steps between corrected points and others.
+/// Sentence on steps between corrected points and others.
 fn steps(report: &PathReport) -> Option<String> {
     let steps = report.steps();
     let place = |point: &&PathPoint| Place { file: point.file, line: point.line, column: 0 };
@@ -174,8 +170,7 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape(report) =>
         {
             format!(
-                "Shape of the path {before:.3} mm RMS before, {after:.3} mm after ({}); as a whole it lies {place_mm:.3} mm off, which is not \
-                 corrected; held-out error of the model {}",
+                "Shape of the path {before:.3} mm RMS before, {after:.3} mm after ({}); its placement is not corrected, {place_mm:.3} mm RMS as it lies; held-out error of the model {}",
                 meaning(report.after),
                 known(report.held_out_mm),
             )

@@ -262,7 +262,7 @@ fn verdict_and_page_tell_what_to_look_at() {
     let (mut plan, mut listing, files) = example();
     let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
     assert!(text.contains("[warning] Corrected, but check the refused and flagged motions"), "{text}");
-    assert!(text.contains("the path has a step of the size of the correction"), "{text}");
+    assert!(text.contains("the path steps by the size of the correction"), "{text}");
     assert!(text.contains("2 targets inserted"), "{text}");
     assert!(text.contains("- tool disc: origin not stated"), "{text}");
     assert!(text.contains("written to out/grind.mod"), "{text}");
@@ -273,8 +273,8 @@ fn verdict_and_page_tell_what_to_look_at() {
     assert!(text.contains("[warning] Corrected, but parts of the program could not be read"), "{text}");
     listing.opaque.clear();
     for (axes, loads, sentence) in [
-        (vec!['a'], 0, "[warning] Corrected for a robot that stands still"),
-        (vec![], 2, "[warning] Corrected for the tool alone where the load is known only at run time"),
+        (vec!['a'], 0, "[warning] Corrected as if the robot base never moves"),
+        (vec![], 2, "[warning] Corrected, but where GripLoad sets the load"),
     ] {
         let plan = Plan { unstated_axes: axes, unknown_loads: loads, ..plan.clone() };
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
@@ -350,7 +350,7 @@ fn work_objects_on_one_fixture_are_named_together() {
     plan.placements[0].others.clear();
     plan.placements.push(placement("wobj0", Placement::Shape, 1.5));
     let text = sentences(&plan, &listing).join("\n");
-    assert!(text.contains("against the other by up to 2.131 mm"), "{text}");
+    assert!(text.contains("against each other by up to 2.131 mm"), "{text}");
     plan.placements[1].held = true;
     assert!(!sentences(&plan, &listing).join("\n").contains("belong together"));
 }
@@ -424,7 +424,7 @@ fn a_program_that_is_corrected_again_states_no_before_and_after() {
     let mark = Mark { version: "0.1.0".to_owned(), model: "abc".to_owned(), partial: false };
     listing.marks = vec![Some(mark), None];
     let again = said(&plan, &listing);
-    assert!(again.contains("[warning] Corrected once more: the corrections add up"), "{again}");
+    assert!(again.contains("[warning] Corrected a second time: both corrections add up"), "{again}");
     assert!(!again.contains("expected after") && !again.contains("probability that"), "{again}");
 }
 
@@ -434,6 +434,6 @@ fn an_uncorrected_program_says_where_its_deviation_is_unknown() {
     let (mut plan, listing, files) = example();
     plan.outcomes.iter_mut().for_each(|outcome| outcome.status = Status::Left);
     let text = terminal::document(&view::summary(&plan, &listing, &files), 400);
-    let expected = "the uncorrected program deviates by up to 1.500 mm where it is known (not at 1 motion)";
+    let expected = "the uncorrected program deviates by up to 1.500 mm; unknown at 1 motion";
     assert!(text.contains(expected), "{text}");
 }

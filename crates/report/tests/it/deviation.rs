@@ -410,7 +410,7 @@ fn a_correction_smaller_than_its_sigma_is_called_so() {
     unsure.points.iter_mut().for_each(|point| point.sigma_mm = Some(4.0));
     let text = page(&unsure);
     assert!(text.contains("[warning] Largest deviation"), "{text}");
-    assert!(text.contains("predicted 1σ of 4.000 mm exceeds the deviation that it corrects"), "{text}");
+    assert!(text.contains("predicted 1σ, 4.000 mm, exceeds the deviation to correct"), "{text}");
 }
 
 #[test]
@@ -450,7 +450,7 @@ fn a_corrected_shape_at_an_uncorrected_place_is_no_failure() {
     });
     let moved = report("arm", points.collect());
     let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(&moved)), 100);
-    for words in ["Shape of the path", "as a whole it lies 2.750 mm off, which is not corrected"] {
+    for words in ["Shape of the path", "its placement is not corrected, 2.750 mm RMS as it lies"] {
         assert!(page.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{words}: {page}");
     }
     assert!(!page.contains("worse"), "{page}");
@@ -516,10 +516,10 @@ fn a_program_that_differs_by_more_than_a_correction_fails_with_its_lines() {
     report.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
     let status = |report: &PathReport| view::status(std::slice::from_ref(report));
     assert_eq!(status(&report), ViewStatus::Good);
-    report.differences = (0..14).map(|k| format!("line {k}: MoveJ, and MoveL in the original")).collect();
+    report.differences = (0..14).map(|k| format!("line {k}: MoveJ here, MoveL in the original")).collect();
     assert_eq!(status(&report), ViewStatus::Bad);
     let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(&report)), 100);
-    assert!(page.contains("[failed] The program differs from the intended one"), "{page}");
+    assert!(page.contains("[failed] The program differs from the original"), "{page}");
     assert!(page.contains("line 0: MoveJ") && page.contains("and 4 more differences"), "{page}");
     let json = view::json(std::slice::from_ref(&report));
     assert_eq!(json["programs"][0]["models"][0]["differences"].as_array().unwrap().len(), 14);
