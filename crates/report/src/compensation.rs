@@ -1,12 +1,12 @@
 //! Report on the compensation of a program: JSON `truegrind.compensation/1`, table of motions, reasons, page.
 
-mod first;
+mod verdict;
 
 use std::collections::{BTreeSet, HashMap};
 
 use serde_json::{Value, json};
 
-use self::first::key_figures;
+use self::verdict::key_figures;
 use super::deviation::{sections, status_cell, status_word};
 use super::document::{Block, Document};
 use super::placement;
@@ -16,7 +16,7 @@ use truegrind_compensation::plan::reason::{Figure, OutcomeReason};
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Place};
 
-pub use self::first::{coverage, verdict};
+pub use self::verdict::{coverage, verdict};
 
 /// One file of a program, by name.
 #[derive(Debug, Clone, PartialEq, Eq)]
