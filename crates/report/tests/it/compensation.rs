@@ -8,6 +8,7 @@ use truegrind_arm::model::Limited;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
+use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_math::option_f64::OptionF64;
 use truegrind_programs::motion::{Listing, Mark, Reason};
@@ -288,6 +289,30 @@ fn verdict_and_page_tell_what_to_look_at() {
         plan.outcomes.iter_mut().for_each(|outcome| outcome.status = status);
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
         assert!(text.contains(sentence), "{text}");
+    }
+}
+
+/// The bound of a probability followed from the first word of its text, and "at most over 99.9 %" is none.
+#[test]
+fn a_probability_that_is_a_bound_by_itself_gets_no_other() {
+    let (mut plan, listing, files) = example();
+    let mut said = |probability_of_harm: f64| {
+        plan.probability_of_harm = Some(probability_of_harm);
+        plan.cuts = vec![CutRisk {
+            motions: vec![1],
+            assessed: Placement::Shape,
+            deviation_mm: 1.0,
+            sigma_mm: 0.1,
+            shape_sigma_mm: 0.1,
+            probability_of_harm,
+            left_for_risk: false,
+            corrected: true,
+        }];
+        terminal::document(&view::summary(&plan, &listing, &files), 300)
+    };
+    for (probability, words) in [(1e-9, "under 0.1 %"), (0.097, "at most 9.7 %"), (1.0, "over 99.9 %")] {
+        let text = said(probability);
+        assert!(text.contains(&format!("for any single cut: {words}\n")), "{text}");
     }
 }
 

@@ -401,6 +401,40 @@ fn pages_of_one_model_of_several_and_of_nothing() {
     assert!(markdown::document(&view::document(&[])).contains("No program has a path"));
 }
 
+/// Under several models only the motions that the first one lacked were counted.
+#[test]
+fn motions_without_a_deviation_are_counted_under_each_model() {
+    let missing = |lines: &[u32]| {
+        let one = |line: &u32| MissingMotion {
+            points_before: 0,
+            file: 0,
+            line: *line,
+            instruction: "MoveJ".to_owned(),
+            status: Status::Left,
+            reason: None,
+        };
+        let listed: Vec<String> = lines.iter().map(u32::to_string).collect();
+        let lines_of = format!("lines {}", listed.join(", "));
+        Some(MissingMotions { motions: lines.iter().map(one).collect(), lines: lines_of })
+    };
+    let of = |model: &str, lines: &[u32]| PathReport {
+        missing: missing(lines).filter(|missing| !missing.motions.is_empty()),
+        ..raster(model, After::PredictedRemainder, 0.0)
+    };
+    let page = |reports: &[PathReport]| {
+        let page = terminal::document(&view::summary("blade.mod", reports), 200);
+        page.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let text = page(&[of("a.toml", &[]), of("b.toml", &[3]), of("c.toml", &[3, 7]), of("d.toml", &[3, 7])]);
+    assert!(text.contains("- b.toml: 1 motion has no known deviation"), "{text}");
+    assert!(text.contains("- c.toml, d.toml: 2 motions have no known deviation"), "{text}");
+    let text = page(&[of("a.toml", &[3]), of("b.toml", &[3])]);
+    assert!(
+        text.contains("- 1 motion has no known deviation") && text.matches("motion has").count() == 1,
+        "{text}"
+    );
+}
+
 #[test]
 fn a_correction_smaller_than_its_sigma_is_called_so() {
     let mut unsure = raster("m", After::PredictedRemainder, 1e-4);
