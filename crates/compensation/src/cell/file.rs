@@ -452,7 +452,7 @@ impl Cell {
 
     /// Joints where a program begins (rad), if this file states them, or the program itself.
     pub(crate) fn start(&self, listing: &Listing) -> Option<Joints> {
-        self.start_deg.or(listing.start_deg).map(|start| Joints::from(start.map(f64::to_radians)))
+        self.start_deg.or(listing.nc.start_deg).map(|start| Joints::from(start.map(f64::to_radians)))
     }
 
     /// What an external axis carries, by its index in [`AXES`].

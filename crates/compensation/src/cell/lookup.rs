@@ -57,7 +57,7 @@ impl<'a> NameIndex<'a> {
 impl<'a> CellLookup<'a> {
     pub(crate) fn of(cell: &'a Cell, listing: &'a Listing) -> Self {
         let mut labels: HashMap<String, Vec<&str>> = HashMap::new();
-        for (number, label) in &listing.labels {
+        for (number, label) in &listing.nc.labels {
             labels.entry(setup::plain(number)).or_default().push(label);
         }
         Self { cell, tools: NameIndex::of(&cell.tool), objects: NameIndex::of(&cell.wobj), labels }

@@ -44,7 +44,7 @@ impl Used {
             let mut targets = listing.motions.iter().flat_map(|motion| &motion.targets);
             let stated =
                 |value: &TargetValue| value.external().get(axis).is_some_and(|value| value.is_some());
-            listing.other_axes.contains_key(&AXES[axis].to_ascii_uppercase())
+            listing.nc.other_axes.contains_key(&AXES[axis].to_ascii_uppercase())
                 || targets.any(|target| target.value.as_ref().is_ok_and(stated))
         };
         let axes = cell.external.iter().enumerate();

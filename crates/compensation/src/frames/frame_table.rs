@@ -193,7 +193,7 @@ impl FrameTable {
 
     /// The same for the axes that blocks of NC programs name. Their values are not read: what they carry must be stated.
     fn axes_of_blocks(&mut self, listing: &Listing, cell: &Cell) {
-        for (&letter, place) in &listing.other_axes {
+        for (&letter, place) in &listing.nc.other_axes {
             let index = AXES.iter().position(|axis| axis.eq_ignore_ascii_case(&letter));
             match index.and_then(|index| cell.carries(index)) {
                 Some(Carries::Base) => self.base_of_blocks = index,

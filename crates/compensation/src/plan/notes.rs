@@ -106,11 +106,11 @@ pub(crate) fn unchecked_notes(
             counted(to_persistent.len(), "motion goes", "motions go")
         ));
     }
-    if let Some(lines) = lines_of(listing, &listing.external_calls) {
+    if let Some(lines) = lines_of(listing, &listing.nc.external_calls) {
         out.push(format!(
             "{} not in the same file: it is assumed to leave work offset, shifts, tool, units and tool centre point control \
              unchanged ({lines})",
-            counted(listing.external_calls.len(), "block calls a program that is", "blocks call a program that is")
+            counted(listing.nc.external_calls.len(), "block calls a program that is", "blocks call a program that is")
         ));
     }
     out.extend(outside_calls_note(listing));
@@ -150,7 +150,7 @@ pub(crate) fn unchecked_notes(
 
 /// NC files of which nothing shows the control, on which the meaning of X, Y, Z depends.
 fn open_control_note(listing: &Listing) -> Option<String> {
-    let lines = numbered(&listing.files, listing.open_controls.iter().copied())?;
+    let lines = numbered(&listing.files, listing.nc.open_controls.iter().copied())?;
     Some(format!(
         "nothing says which control the program is for. It was read as ISO 6983: X Y Z are the tool tip, and numbers without a decimal point are \
          mm (from {lines}). A Fanuc reads both differently. State the control in a comment of the program: \

@@ -13,7 +13,7 @@ use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
-use truegrind_programs::motion::{Frame, Listing};
+use truegrind_programs::motion::{Frame, Listing, NcFacts};
 use truegrind_programs::nc::Task;
 use truegrind_programs::nc::setup::Setup;
 
@@ -128,7 +128,7 @@ fn a_comment_says_where_the_arm_starts() {
     over[3] += 180.0;
     over[4] *= -1.0;
     over[5] += 180.0;
-    let said = Listing { start_deg: Some(over), ..usual.clone() };
+    let said = Listing { nc: NcFacts { start_deg: Some(over), ..usual.nc.clone() }, ..usual.clone() };
     let plan = planned(&arm, &said, &Cell::default());
     let q = joints_deg(&plan)[0];
     assert!((0..6).all(|j| (q[j] - over[j]).abs() < 1e-6), "{q:?} {over:?}");
@@ -137,7 +137,10 @@ fn a_comment_says_where_the_arm_starts() {
     let with_both = planned(&arm, &said, &started([0.0, 0.0, 90.0, 0.0, 90.0, 0.0]));
     let [a, b] = [begins(&with_both), begins(&planned(&arm, &usual, &Cell::default()))];
     assert!((0..6).all(|j| (a[j] - b[j]).abs() < 1e-6), "{a:?} {b:?}");
-    let far = Listing { start_deg: Some([0.0, 0.0, 400.0, 0.0, 90.0, 0.0]), ..usual };
+    let far = Listing {
+        nc: NcFacts { start_deg: Some([0.0, 0.0, 400.0, 0.0, 90.0, 0.0]), ..usual.nc.clone() },
+        ..usual
+    };
     let found = contradictions(&far, &Cell::default(), &arm.nominal);
     assert!(
         found.len() == 1 && found[0].starts_with("`truegrind start` of the program: joint 3"),

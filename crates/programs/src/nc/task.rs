@@ -128,7 +128,7 @@ impl<'s> Task<'s> {
             let mut motions = task.listing.motions.iter().filter(|motion| motion.place.file as usize == file);
             motions.find(|motion| motion.reason().is_none()).map(|motion| motion.place)
         };
-        task.listing.open_controls = open.filter_map(first).collect();
+        task.listing.nc.open_controls = open.filter_map(first).collect();
         task
     }
 }
@@ -332,7 +332,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         &Lengths([motions, speeds, zones, tools, objects, events, contexts, points]): &Lengths,
     ) {
         self.listing.motions.truncate(motions);
-        self.listing.external_calls.retain(|call| (*call as usize) < motions);
+        self.listing.nc.external_calls.retain(|call| (*call as usize) < motions);
         self.listing.speeds.truncate(speeds);
         self.listing.zones.truncate(zones);
         self.listing.tools.truncate(tools);
@@ -365,7 +365,7 @@ impl<'t, 's> Interpreter<'t, 's> {
                 Ok(Some(Statement::Tool(stated))) => tools.push((token, stated)),
                 Ok(Some(Statement::Frame(stated))) => frames.push((token, stated)),
                 Ok(Some(Statement::Start(stated))) => {
-                    let first = *self.listing.start_deg.get_or_insert(stated);
+                    let first = *self.listing.nc.start_deg.get_or_insert(stated);
                     if first != stated {
                         let expected = format!("{first:?}, as stated before: the arm starts once");
                         self.list_unusable_comment(token);
@@ -395,7 +395,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             self.setup.tools.iter().cloned().chain(used).map(|one| tool(&one)).collect();
         self.listing.declared_tools.extend(declared);
         let labels = tools.into_iter().chain(frames).map(|(_, stated)| (stated.number, stated.name));
-        self.listing.labels.extend(labels);
+        self.listing.nc.labels.extend(labels);
         // The setup overrides comments.
         let beside = |list: &[(String, Frame)]| -> Vec<(String, Frame)> {
             list.iter().map(|(name, frame)| (setup::plain(name), *frame)).collect()

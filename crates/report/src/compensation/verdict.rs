@@ -60,7 +60,7 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
             "Corrected, but the path steps next to uncorrected motions: check them before running the program",
         ),
         (
-            !listing.open_controls.is_empty(),
+            !listing.nc.open_controls.is_empty(),
             "Corrected, but nothing says which control the program is for: state it before running the program",
         ),
         (

@@ -349,7 +349,7 @@ impl Interpreter<'_, '_> {
             None => true,
         };
         if !is_own {
-            self.listing.external_calls.push(self.listing.motions.len() as u32);
+            self.listing.nc.external_calls.push(self.listing.motions.len() as u32);
         }
         self.list_left(block, name, Reason::Subprogram);
         self.join_unseen_predecessors();

@@ -308,7 +308,7 @@ impl Interpreter<'_, '_> {
             let call = self.state.modal_call;
             // G66 has been listed itself.
             if !self.dialect.paren_comments() {
-                self.listing.external_calls.push(self.listing.motions.len() as u32 - 1);
+                self.listing.nc.external_calls.push(self.listing.motions.len() as u32 - 1);
             }
             self.join_unseen_predecessors();
             let callee = Some(self.pass.modal_callee.clone().unwrap_or_default());
@@ -409,7 +409,7 @@ impl Interpreter<'_, '_> {
         for word in &block.words {
             if let Some(letter) = letter(word) {
                 let place = self.place(word.first);
-                self.listing.other_axes.entry(letter).or_insert(place);
+                self.listing.nc.other_axes.entry(letter).or_insert(place);
             }
         }
     }
