@@ -216,7 +216,7 @@ impl Transfer for Interpreter<'_, '_> {
         let mut block = self.block.take().unwrap_or_default();
         self.collect_words(node, &mut block);
         self.has_nc_blocks |=
-            !block.opaque && (!block.g.is_empty() || !block.m.is_empty() || block.has_motion_words());
+            !block.flags.opaque && (!block.g.is_empty() || !block.m.is_empty() || block.has_motion_words());
         self.in_skippable_block = nesting.guarded;
         self.interpret(&block);
         self.block = Some(block);
@@ -463,7 +463,7 @@ impl<'t, 's> Interpreter<'t, 's> {
 
     /// The transfer function of a block.
     fn transfer_words(&mut self, block: &Block<'s>) {
-        if let Some(on) = block.radius_compensation {
+        if let Some(on) = block.flags.radius_compensation {
             self.set_group(ModalGroup::RadiusCompensation, u64::from(on));
         }
         if self.dialect == Dialect::Heidenhain && self.heidenhain(block) {
@@ -491,14 +491,14 @@ impl<'t, 's> Interpreter<'t, 's> {
             self.end_of_block(block);
             return;
         }
-        if block.opaque && block.opaque_may_set {
+        if block.flags.opaque && block.flags.opaque_may_set {
             self.list_unknown_word(block, "?", Reason::Unreadable);
             self.end_of_block(block);
             return;
         }
         self.m_words(block);
         self.tool_words(block);
-        let machine = block.machine_coordinates
+        let machine = block.flags.machine_coordinates
             || block.g.contains(&530)
             || self.dialect == Dialect::Siemens && block.g.contains(&1530)
             || self.dialect == Dialect::Heidenhain && block.m.iter().any(|m| matches!(m, 91 | 92));
