@@ -89,7 +89,7 @@ impl CellArguments {
         }
         bail!(
             "--payload {kg}: the masses of {} are not known, so its deflection was identified for the load of the measurement ({measured_kg} kg) and \
-             follows no other: measure with {kg} kg on the flange, or leave --payload out and count on what the difference of the loads makes",
+             follows no other: measure with {kg} kg on the flange, or omit --payload and accept the error from the different load",
             model.robot
         )
     }

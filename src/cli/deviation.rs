@@ -1,5 +1,6 @@
 //! `truegrind deviation PROGRAM… --model MODEL.toml…`: the deviation report, without rewriting.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
@@ -315,7 +316,7 @@ impl DeviationContext<'_> {
             // Rewriting inserts motions and removes none.
             if moves < intended {
                 bail!(
-                    "{name}: it has {moves} motions, and the program of --intended {intended}: give the program from which it was rewritten"
+                    "{name}: {moves} motions, but the program of --intended has {intended}: give the program from which it was rewritten"
                 );
             }
         }
@@ -323,8 +324,7 @@ impl DeviationContext<'_> {
             && let Some(mark) = task.listing().marks.iter().flatten().next()
         {
             bail!(
-                "{name}: it was corrected with model {}, so its targets are not where the tool is meant to go: give the program from which \
-                 it was rewritten too (--intended)",
+                "{name}: already corrected with model {}; give the original program as well (--intended)",
                 mark.model
             );
         }
@@ -382,12 +382,15 @@ pub(super) fn why_no_point(reports: &[PathReport]) -> String {
         return "it has no motion of the tool".to_owned();
     }
     let mut reasons: Vec<(&str, usize, u32)> = Vec::new();
+    // Sentences that name lines or sizes are many.
+    let mut index_of: HashMap<&str, usize> = HashMap::new();
     for motion in motions {
-        let reason = motion.reason.as_deref().unwrap_or("the program text does not tell where it leads");
-        match reasons.iter_mut().find(|(known, ..)| *known == reason) {
-            Some((_, count, _)) => *count += 1,
-            None => reasons.push((reason, 1, motion.line)),
-        }
+        let reason = motion.reason.as_deref().unwrap_or("its target is not in the program text");
+        let index = *index_of.entry(reason).or_insert_with(|| {
+            reasons.push((reason, 0, motion.line));
+            reasons.len() - 1
+        });
+        reasons[index].1 += 1;
     }
     reasons.sort_by_key(|(_, count, _)| std::cmp::Reverse(*count));
     let told: Vec<String> = reasons
@@ -412,8 +415,8 @@ fn refuse_unrelated(name: &str, reports: &[PathReport]) -> anyhow::Result<()> {
         .max_by(|(_, a), (_, b)| a.total_cmp(b));
     if let Some((line, mm)) = farthest.filter(|(_, mm)| *mm > OTHER_TARGET_MM) {
         bail!(
-            "{name}: it ends {mm:.0} mm from the target of line {line} of the program of --intended, further than any correction: give the \
-             program from which it was rewritten"
+            "{name}: it ends {mm:.0} mm from the target of line {line} of the program of --intended, further than any correction: give the program \
+             from which it was rewritten"
         );
     }
     Ok(())

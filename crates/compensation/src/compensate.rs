@@ -40,7 +40,7 @@ pub struct Compensated {
 impl Compensated {
     /// Whether a motion is rewritten.
     pub fn changed(&self) -> bool {
-        self.plan.outcomes.iter().any(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
+        self.plan.outcomes.iter().any(|outcome| outcome.status.is_written())
     }
 }
 
@@ -91,53 +91,50 @@ pub fn compensate_prepared(
     let rewrite = RewriteOptions { mark, ..RewriteOptions::default() };
     let mut targets = SolvedProgram::of(listing, prepared, cell, options);
     let mut refused: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
-    let mut round = 0;
     let play =
         arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_zero());
+    let mut round = 0;
     loop {
         let planned = targets.plan(&refused);
-        if listing.numbered && options.cuts != Cuts::Single {
-            let alone = air_moves_alone(listing, &planned);
-            if !alone.is_empty() {
-                refused.extend(alone.into_iter().map(|motion| (motion, OutcomeReason::AirMoveAlone)));
-                continue;
-            }
-        }
-        if program.accepts(&planned.changes) {
+        let alone =
+            if options.cuts == Cuts::Single { Vec::new() } else { air_moves_alone(listing, &planned) };
+        let found: BTreeMap<u32, OutcomeReason> = if !alone.is_empty() {
+            alone.into_iter().map(|motion| (motion, OutcomeReason::AirMoveAlone)).collect()
+        } else if program.accepts(&planned.changes) {
             // Frees the solved targets while the edits are made; no second plan is needed.
             let ((), rewritten) =
                 rayon::join(|| drop(targets), || program.rewrite(&planned.changes, &rewrite));
             return Ok(agreed(planned, rewritten?, &BTreeMap::new(), (program, arm), options));
-        }
-        let rewritten = program.rewrite(&planned.changes, &rewrite)?;
-        let found = refusals(&planned, &rewritten, listing);
-        // Motions judged one by one need no second plan, unless an unmodified motion changes the backlash
-        // sides of later ones, or the start of a line that is written as joints.
-        let alone = options.cuts == Cuts::Single && !play && options.emit == Emit::Targets;
-        if found.is_empty() || alone {
-            return Ok(agreed(planned, rewritten, &found, (program, arm), options));
-        }
+        } else {
+            let rewritten = program.rewrite(&planned.changes, &rewrite)?;
+            let found = refusals(&planned, &rewritten, listing);
+            // Motions judged one by one need no second plan, unless an unmodified motion changes the backlash
+            // sides of later ones, or the start of a line that is written as joints.
+            let single = options.cuts == Cuts::Single && !play && options.emit == Emit::Targets;
+            if found.is_empty() || single {
+                return Ok(agreed(planned, rewritten, &found, (program, arm), options));
+            }
+            found
+        };
         for (motion, reason) in found {
             refused.entry(motion).or_insert(reason);
         }
         round += 1;
-        if round >= MOST_ROUNDS
-            && let Some((first, reason)) = refused.iter().next()
-        {
-            // No agreement was reached: every round removed more motions, so the whole program remains
-            // unmodified.
-            let line = listing.motions[*first as usize].place.line;
-            let rest = OutcomeReason::PartOfCut { line, because: reason.kind() };
+        if round >= MOST_ROUNDS {
+            // Every round removed more motions, so the whole program remains unmodified.
             for change in &planned.changes {
-                refused.entry(change.motion).or_insert(rest);
+                refused.entry(change.motion).or_insert(OutcomeReason::NoConsistentPlan);
             }
         }
     }
 }
 
-/// Air moves that would be corrected before a cut that is not, or behind it with no further cut in the file: the lines of the cut would
-/// begin elsewhere, and take the axes that they omit from them.
+/// Air moves of an NC program next to a cut that stays uncorrected (before it, or after the last cut of the file): correcting them would
+/// move its start, and the axes that its blocks omit.
 fn air_moves_alone(listing: &Listing, planned: &Plan) -> Vec<u32> {
+    if !listing.numbered {
+        return Vec::new();
+    }
     let motions = &listing.motions;
     let mut is_corrected = vec![false; motions.len()];
     planned.changes.iter().for_each(|change| is_corrected[change.motion as usize] = true);

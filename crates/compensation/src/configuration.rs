@@ -53,9 +53,9 @@ pub(crate) fn configured(
 /// The joints of a flange pose that states no configuration (NC), where nothing tells how the arm came there: the solution in
 /// the branch in which it is stated to start, or the most usual one.
 ///
-/// Usual are a wrist in front of axis 1, an elbow that is not turned back, and of what is left the joints nearest to zero, by the sum
-/// of their sizes, whichever way the maker counts them: a tool that points down has axis 5 at +90° on an ABB and at −90° on a FANUC,
-/// and axis 4 at 0° on both.
+/// The usual one has the wrist in front of axis 1 and an elbow that is not turned back, and then the smallest sum of absolute joint angles,
+/// whichever way the maker counts them: a tool that points down has axis 5 at +90° on an ABB and at −90° on a FANUC, and axis 4 at 0° on
+/// both.
 pub(crate) fn unstated(
     nominal: &Inverse<'_>,
     flange: &Pose,

@@ -69,6 +69,13 @@ pub enum Status {
     Flagged,
 }
 
+impl Status {
+    /// Whether the motion is rewritten.
+    pub fn is_written(self) -> bool {
+        matches!(self, Status::Changed | Status::Flagged)
+    }
+}
+
 /// A point closer to the surface than this is cutting (mm).
 pub(crate) const ON_SURFACE_MM: f64 = 0.5;
 
@@ -129,7 +136,7 @@ impl PathPoint {
 
     /// Whether it is rewritten.
     pub fn is_corrected(&self) -> bool {
-        matches!(self.status, Status::Changed | Status::Flagged)
+        self.status.is_written()
     }
 
     /// Whether its σ is that of the shape alone.

@@ -25,7 +25,7 @@ pub mod compensate;
 pub mod condition;
 mod configuration;
 pub mod cut;
-mod line_list;
+pub mod line_list;
 pub mod deviation;
 mod feasibility;
 pub mod frames;

@@ -26,7 +26,7 @@ use truegrind_arm::model::{Joints, Model};
 use truegrind_math::se3::Pose;
 use truegrind_math::work::checkpoint;
 use truegrind_programs::motion::load::Loads;
-use truegrind_programs::motion::{Listing, MotionKind, Reason, Role, TargetValue};
+use truegrind_programs::motion::{Listing, MotionKind, Reason, TargetValue};
 use truegrind_surfaces::Surface;
 
 /// Commanded end of a motion.
@@ -73,6 +73,14 @@ pub struct VerificationTask<'a> {
     pub loads: [Option<&'a Loads>; 2],
 }
 
+/// The rewritten program and its ends, by motion.
+struct RewrittenRun<'a> {
+    listing: &'a Listing,
+    ends: Vec<Option<&'a ExecutedEnd>>,
+    /// The rewritten motion of each original one.
+    partners: Vec<Option<usize>>,
+}
+
 /// Runs a program on an arm.
 pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathReport {
     let mut arms = Arms::simulated(acting_arm.nominal, acting_arm.model, &acting_arm.condition);
@@ -83,70 +91,26 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
     let after =
         task.rewritten.map(|listing| (listing, run(listing, task.loads[1], start, &mut arms, task.cell).0));
     let ends = by_motion(&before, task.original.motions.len());
-    let after = after.as_ref().map(|(listing, runs)| (*listing, by_motion(runs, listing.motions.len())));
-    let partners = after.as_ref().map(|(_, after)| align(&ends, after));
-    let differences = match (&after, &partners) {
-        (Some((rewritten, after)), Some(partners)) => {
-            Compared { original: task.original, rewritten, partners, before: &ends, after }.differences()
-        }
-        _ => Vec::new(),
-    };
-    let points = before
-        .iter()
-        .enumerate()
-        .map(|(index, first)| {
-            checkpoint();
-            let motion = &task.original.motions[first.motion];
-            let contact =
-                task.surface.and_then(|s| s.foot(&Point3::from(first.commanded.translation.vector)));
-            let on_surface = contact.as_ref().is_some_and(|f| f.normal_mm.abs() < ON_SURFACE_MM);
-            let normal: Option<Vector3<f64>> = contact.map(|f| f.contact.normal.into_inner());
-            let deviation = |reached: &Pose| {
-                Deviation::between(&first.commanded, reached, &Pose::identity(), normal.as_ref())
-            };
-            let second = match (&after, &partners) {
-                (Some((_, after)), Some(partners)) => partners[first.motion].and_then(|k| after[k]),
-                _ => None,
-            };
-            let same = second.is_some_and(|second| is_same_target(first, second));
-            let (joints, condition_index) =
-                second.map_or((first.joints, first.condition_index), |s| (s.joints, s.condition_index));
-            let linear = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
-            PathPoint {
-                index,
-                file: motion.place.file,
-                line: motion.place.line,
-                instruction: motion.instruction.to_string(),
-                kind: motion.kind,
-                cutting: if task.surface.is_some() { linear && on_surface } else { linear },
-                base_from_object: first.base_from_object,
-                flange_from_tool: first.flange_from_tool,
-                intended: first.base_from_object * first.commanded,
-                normal,
-                joints_before: Some(first.joints),
-                joints_after: second.map(|s| s.joints),
-                before: Some(deviation(&first.reached)),
-                after: second.map(|s| deviation(&s.reached)),
-                sigma_mm: acting_arm.knowledge.map(|k| {
-                    let (tool, carried) = (&first.flange_from_tool, first.carried.as_ref());
-                    let carried = carried.map(RegisteredFrame::carried);
-                    let known =
-                        k.position_sigma_mm(arms.conditions.arm(condition_index), &joints, tool, carried);
-                    known.hypot(arms.conditions.play_uncertainty_mm(condition_index, &joints, tool))
-                }),
-                shape_sigma_mm: None,
-                outside: acting_arm.knowledge.and_then(|k| k.region.outside(&joints)),
-                status: if second.is_some() && !same { Status::Changed } else { Status::Left },
-                reason: same.then(|| "the rewritten program has it as the original".to_owned()),
-            }
-        })
-        .collect();
+    let after = after.as_ref().map(|(listing, after)| {
+        let after = by_motion(after, listing.motions.len());
+        RewrittenRun { listing, partners: align(&ends, &after), ends: after }
+    });
+    let differences =
+        after.as_ref().map_or_else(Vec::new, |RewrittenRun { listing, ends: after, partners }| {
+            Compared { original: task.original, rewritten: listing, partners, before: &ends, after }
+                .differences()
+        });
+    let points = before.iter().enumerate().map(|(index, first)| {
+        checkpoint();
+        let second = after.as_ref().and_then(|after| after.ends[after.partners[first.motion]?]);
+        path_point(index, (first, second), task, acting_arm, &arms)
+    });
     PathReport {
         program: task.program.to_owned(),
         files: files_of(task.original),
         model: task.name.to_owned(),
         after: task.after,
-        points,
+        points: points.collect(),
         missing: MissingMotions::of(task.original, |motion| {
             let (_, reason) =
                 without_end.get(without_end.binary_search_by_key(&motion, |(of, _)| *of).ok()?)?;
@@ -154,6 +118,52 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         }),
         differences,
         held_out_mm: acting_arm.knowledge.map(|k| k.geometry.held_out.rmse),
+    }
+}
+
+/// The point of a motion that ends at `first` in the original program and at `second` in the rewritten one.
+fn path_point(
+    index: usize,
+    (first, second): (&ExecutedEnd, Option<&ExecutedEnd>),
+    task: &VerificationTask<'_>,
+    acting_arm: &ActingArm<'_>,
+    arms: &Arms<'_>,
+) -> PathPoint {
+    let motion = &task.original.motions[first.motion];
+    let contact = task.surface.and_then(|s| s.foot(&Point3::from(first.commanded.translation.vector)));
+    let on_surface = contact.as_ref().is_some_and(|f| f.normal_mm.abs() < ON_SURFACE_MM);
+    let normal: Option<Vector3<f64>> = contact.map(|f| f.contact.normal.into_inner());
+    let deviation =
+        |reached: &Pose| Deviation::between(&first.commanded, reached, &Pose::identity(), normal.as_ref());
+    let same = second.is_some_and(|second| is_same_target(first, second));
+    let (joints, condition_index) =
+        second.map_or((first.joints, first.condition_index), |s| (s.joints, s.condition_index));
+    let linear = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
+    PathPoint {
+        index,
+        file: motion.place.file,
+        line: motion.place.line,
+        instruction: motion.instruction.to_string(),
+        kind: motion.kind,
+        cutting: if task.surface.is_some() { linear && on_surface } else { linear },
+        base_from_object: first.base_from_object,
+        flange_from_tool: first.flange_from_tool,
+        intended: first.base_from_object * first.commanded,
+        normal,
+        joints_before: Some(first.joints),
+        joints_after: second.map(|s| s.joints),
+        before: Some(deviation(&first.reached)),
+        after: second.map(|s| deviation(&s.reached)),
+        sigma_mm: acting_arm.knowledge.map(|k| {
+            let (tool, carried) = (&first.flange_from_tool, first.carried.as_ref());
+            let carried = carried.map(RegisteredFrame::carried);
+            let known = k.position_sigma_mm(arms.conditions.arm(condition_index), &joints, tool, carried);
+            known.hypot(arms.conditions.play_uncertainty_mm(condition_index, &joints, tool))
+        }),
+        shape_sigma_mm: None,
+        outside: acting_arm.knowledge.and_then(|k| k.region.outside(&joints)),
+        status: if second.is_some() && !same { Status::Changed } else { Status::Left },
+        reason: same.then(|| "same as in the original".to_owned()),
     }
 }
 
@@ -231,13 +241,12 @@ fn condition_indices(
         .collect();
     for there in sent {
         let motion = &listing.motions[there.motion];
-        let via = motion.targets.iter().find(|target| target.role == Role::Via);
         stops[there.motion] = MotionEnd::At(ReachedEnd {
             motion,
             frames_index: there.frames_index,
             commanded: there.commanded,
             joints: there.joints,
-            via: via.and_then(|via| via.value.ok()?.cartesian().map(|t| t.pose())),
+            via: motion.via().and_then(|via| via.value.ok()?.cartesian().map(|t| t.pose())),
             links: None,
             as_joints: false,
             may_insert: false,

@@ -5,7 +5,7 @@
 //! - [`motion`]: the motions of a program in any language, as a [`motion::Listing`].
 //! - [`rewrite`]: changes to motions in any language, and their outcomes.
 //! - `dataflow`: program analysis for every language: joins, fixpoints, the walk over statements.
-//! - [`shared`]: persistent maps with cheap copies and joins, for abstract states.
+//! - [`persistent_map`]: persistent maps with cheap copies and joins, for abstract states.
 //! - [`draft`]: new programs, independent of the language.
 //! - [`rapid`]: ABB's RAPID: front end, evaluation, rewriting, writing.
 //! - [`nc`]: G-code of five-axis machines: the same.
@@ -32,7 +32,7 @@
 pub mod tree;
 mod dataflow;
 mod motion_set;
-pub mod shared;
+pub mod persistent_map;
 pub mod edit;
 pub mod label;
 pub mod diff;

@@ -383,6 +383,11 @@ impl Motion {
         self.targets.iter().rev().find(|target| target.role == Role::To)
     }
 
+    /// The circle point of a circular motion.
+    pub fn via(&self) -> Option<&MotionTarget> {
+        self.targets.iter().find(|target| target.role == Role::Via)
+    }
+
     /// The Cartesian target at the end of the motion, if it is known.
     pub fn cartesian_end(&self) -> Option<RobTarget> {
         self.to()?.value.ok()?.cartesian().copied()
@@ -472,10 +477,6 @@ pub struct Listing {
     /// Tools that are declared in the files or stated beside them, used or not: a work object may have been taught
     /// with a tool that this program never uses.
     pub declared_tools: Vec<Tool>,
-    /// Names in comments of an NC program for its numbered tools and work offsets: number (`T1`, `G54`), name.
-    pub labels: Vec<(String, String)>,
-    /// The joints in which the arm starts (°), if a comment of an NC program states them.
-    pub start_deg: Option<[f64; 6]>,
     /// Work objects that motions use.
     pub work_objects: Vec<WorkObject>,
     /// Speeds that motions use.
@@ -488,13 +489,8 @@ pub struct Listing {
     pub routines: Vec<Routine>,
     /// Whether it is of NC programs, with numbered tools and work offsets.
     pub numbered: bool,
-    /// The first motion of each NC file that could be corrected and whose control neither its words nor a comment show: it is read as plain
-    /// ISO 6983.
-    pub open_controls: Vec<Place>,
-    /// Letters of the axes that NC blocks name beside X, Y, Z, A, B and C, and the first of each.
-    pub other_axes: BTreeMap<char, Place>,
-    /// Motions that call a program outside their file (NC).
-    pub external_calls: Vec<u32>,
+    /// What NC programs alone have.
+    pub nc: NcFacts,
     /// Calls of routines that no file declares (RAPID).
     pub outside_calls: Vec<OutsideCall>,
     /// Motions that may follow each other across a call of a routine or its return, and in NC files across a jump: the earlier and the
@@ -510,6 +506,22 @@ pub struct Listing {
     /// Unusable comments that state something for the correction (`truegrind angles …`); nothing may be corrected
     /// before they are fixed.
     pub invalid_statements: Vec<InvalidStatement>,
+}
+
+/// What a listing of NC programs has beside its motions.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct NcFacts {
+    /// Names in comments of an NC program for its numbered tools and work offsets: number (`T1`, `G54`), name.
+    pub labels: Vec<(String, String)>,
+    /// The joints in which the arm starts (°), if a comment of an NC program states them.
+    pub start_deg: Option<[f64; 6]>,
+    /// The first motion of each NC file that could be corrected and whose control neither its words nor a comment show: it is read as plain
+    /// ISO 6983.
+    pub open_controls: Vec<Place>,
+    /// Letters of the axes that NC blocks name beside X, Y, Z, A, B and C, and the first of each.
+    pub other_axes: BTreeMap<char, Place>,
+    /// Motions that call a program outside their file (NC).
+    pub external_calls: Vec<u32>,
 }
 
 /// An offset of a target by persistent data, which stay on the controller when the program ends: an operator or another task may change
@@ -579,7 +591,7 @@ impl fmt::Display for InvalidStatement {
 impl Listing {
     /// The names in comments for a tool or work offset.
     pub fn labels_of(&self, number: &str) -> impl Iterator<Item = &str> {
-        let here = self.labels.iter().filter(move |(other, _)| super::label::same(other, number));
+        let here = self.nc.labels.iter().filter(move |(other, _)| super::label::same(other, number));
         here.map(|(_, label)| label.as_str())
     }
 

@@ -67,7 +67,7 @@ pub struct Row {
     pub expected_mm: Option<f64>,
     /// The error, or a remark.
     pub note: Option<String>,
-    /// What makes the program doubtful although nothing in it was refused or flagged, such as steps beside motions that are left.
+    /// What makes the program doubtful although nothing in it was refused or flagged, such as steps next to uncorrected motions.
     #[serde(default)]
     pub doubt: Option<String>,
     /// The most frequent reason among refused, else flagged, else left motions, with its count.
@@ -80,10 +80,7 @@ impl Row {
         let mut counts = [0; 4];
         plan.outcomes.iter().for_each(|outcome| counts[outcome.status as usize] += 1);
         let count = |motion_status: MotionStatus| counts[motion_status as usize];
-        let written = |motion_status: MotionStatus| {
-            matches!(motion_status, MotionStatus::Changed | MotionStatus::Flagged)
-        };
-        let after = plan.outcomes.iter().filter(|o| written(o.status)).filter_map(|o| o.after_mm.get());
+        let after = plan.outcomes.iter().filter(|o| o.status.is_written()).filter_map(|o| o.after_mm.get());
         // Before and after of the same motions: those of which most is expected to remain.
         let found = placement::before_and_after(plan, listing).into_iter();
         let most = found.max_by(|a, b| a.expected_mm.unwrap_or(0.0).total_cmp(&b.expected_mm.unwrap_or(0.0)));
@@ -347,7 +344,7 @@ pub fn document(rows: &[Row]) -> Document {
         KeyFigure::new("Corrected", changed + flagged, 0, "")
             .note(format!("of {motions} motions, {flagged} of them flagged")),
         KeyFigure::new("Largest before", largest(|row| row.before_mm), 3, "mm")
-            .note("uncorrected; of programs with corrected motions, the largest of these"),
+            .note("of the corrected motions; in programs without any, of all motions"),
         KeyFigure::new("Expected after", largest(|row| row.expected_mm), 3, "mm")
             .note("1σ: largest of the corrected motions"),
         KeyFigure::new("To check", rows.iter().filter(|row| !row.is_clean()).count(), 0, "")

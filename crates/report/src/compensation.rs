@@ -1,23 +1,22 @@
 //! Report on the compensation of a program: JSON `truegrind.compensation/1`, table of motions, reasons, page.
 
-mod first;
+mod verdict;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use serde_json::{Value, json};
 
-use self::first::key_figures;
+use self::verdict::key_figures;
 use super::deviation::{sections, status_cell, status_word};
 use super::document::{Block, Document};
 use super::placement;
 use super::table::{Cell, Column, Table};
-use truegrind_arm::inverse::InverseError;
 use truegrind_compensation::deviation::{PathReport, Status as MotionStatus};
-use truegrind_compensation::plan::reason::OutcomeReason;
+use truegrind_compensation::plan::reason::{Figure, OutcomeReason};
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Place};
 
-pub use self::first::{coverage, verdict};
+pub use self::verdict::{coverage, verdict};
 
 /// One file of a program, by name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -76,8 +75,7 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
         table.push(row);
     }
     table.notes.push(
-        "before: deviation of the tool at the end of the uncorrected motion. remainder: predicted remainder, which rounding and \
-         inverse kinematics leave under the same model; a motion that is left or refused keeps its deviation. 1σ: predicted from \
+        "before: deviation of the tool at the end of the uncorrected motion. remainder: what the model predicts is left after rounding and inverse kinematics; uncorrected motions keep their deviation. 1σ: predicted from \
          the covariance of the model, for the shape of the cut (after the best rigid registration of all cuts on the part) and for its placement. between: \
          deviation from the intended path between the targets. Inserted: number of targets inserted before the end of the motion."
             .to_owned(),
@@ -131,7 +129,7 @@ pub fn reason_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Ta
             status_cell(group.status),
             group.outcomes.len().into(),
             with_causes(&group).into(),
-            group.worst.map(|(value, unit)| worst_text(value, unit)).into(),
+            group.worst.map(|figure| figure.to_string()).into(),
             lines(&group.outcomes, listing, files).into(),
         ]);
     }
@@ -305,154 +303,66 @@ fn file_name(files: &[ProgramFile], place: Place) -> &str {
 /// Motions with the same status and the same kind of reason.
 struct Group<'a> {
     status: MotionStatus,
-    reason: String,
-    /// The worst value of the reason, with its unit.
-    worst: Option<(f64, &'static str)>,
+    reason: Option<OutcomeReason>,
+    /// The worst value of the reason.
+    worst: Option<Figure>,
     outcomes: Vec<&'a MotionOutcome>,
 }
 
-/// The reason, with the lines of the motions that caused it if they are others than those of the group.
+/// The reason, with the joints that it is about, and the lines of the motions that caused it.
 fn with_causes(group: &Group<'_>) -> String {
-    const NAMED: usize = 4;
-    let causes: BTreeSet<u32> = group.outcomes.iter().filter_map(|outcome| cause(outcome)).collect();
-    let named: Vec<String> = causes.iter().take(NAMED).map(u32::to_string).collect();
-    match causes.len() {
-        0 => group.reason.clone(),
-        1 => format!("{} (line {})", group.reason, named[0]),
-        count if count <= NAMED => format!("{} (lines {})", group.reason, named.join(", ")),
-        count => format!("{} (lines {} and {} more)", group.reason, named.join(", "), count - NAMED),
-    }
+    let kind = match group.reason {
+        Some(OutcomeReason::PartOfCut { because, .. }) => format!(
+            "a cut is corrected as a whole or not at all, and another motion of this cut is not corrected: {because}"
+        ),
+        Some(reason) => reason.kind().to_owned(),
+        None => "nothing to change".to_owned(),
+    };
+    let reasons = || group.outcomes.iter().filter_map(|outcome| outcome.reason());
+    let joints: BTreeSet<String> =
+        reasons().filter_map(|reason| reason.limited()).map(|what| what.to_string()).collect();
+    let mut details: Vec<String> = joints.into_iter().collect();
+    details.extend(cause_lines(&reasons().filter_map(|reason| reason.cause_line()).collect()));
+    if details.is_empty() { kind } else { format!("{kind} ({})", details.join(", ")) }
 }
 
-/// Line of the motion because of which another one is not corrected.
-fn cause(outcome: &MotionOutcome) -> Option<u32> {
-    match outcome.reason()? {
-        OutcomeReason::PartOfCut { line, .. } | OutcomeReason::Step { line, .. } => Some(line),
-        _ => None,
+/// The first few of some lines.
+fn cause_lines(lines: &BTreeSet<u32>) -> Option<String> {
+    const NAMED: usize = 4;
+    let named: Vec<String> = lines.iter().take(NAMED).map(u32::to_string).collect();
+    match lines.len() {
+        0 => None,
+        1 => Some(format!("line {}", named[0])),
+        count if count <= NAMED => Some(format!("lines {}", named.join(", "))),
+        count => Some(format!("lines {} and {} more", named.join(", "), count - NAMED)),
     }
 }
 
 fn grouped(plan: &Plan) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
+    let mut index_of: HashMap<_, usize> = HashMap::new();
     for outcome in plan.outcomes.iter().filter(|outcome| outcome.status != MotionStatus::Changed) {
-        let (reason, figure) = match &outcome.reason() {
-            Some(why) => split_reason(why),
-            None => ("nothing to change".to_owned(), None),
+        let reason = outcome.reason();
+        // The kind of a part of a cut is that of the motion that caused it.
+        let key = reason.map(|reason| (std::mem::discriminant(&reason), reason.kind()));
+        let index = *index_of.entry((rank(outcome.status), key)).or_insert_with(|| {
+            groups.push(Group { status: outcome.status, reason, worst: None, outcomes: Vec::new() });
+            groups.len() - 1
+        });
+        let group = &mut groups[index];
+        group.outcomes.push(outcome);
+        group.worst = match (group.worst, reason.and_then(|reason| reason.figure())) {
+            (Some(a), Some(b)) if b.value() > a.value() => Some(b),
+            (None, b) => b,
+            (a, _) => a,
         };
-        match groups.iter_mut().find(|group| group.status == outcome.status && group.reason == reason) {
-            Some(group) => {
-                group.outcomes.push(outcome);
-                group.worst = match (group.worst, figure) {
-                    (Some(a), Some(b)) if b.0 > a.0 => Some(b),
-                    (None, b) => b,
-                    (a, _) => a,
-                };
-            }
-            None => {
-                groups.push(Group { status: outcome.status, reason, worst: figure, outcomes: vec![outcome] })
-            }
-        }
     }
-    let rank = |status: MotionStatus| {
-        [MotionStatus::Refused, MotionStatus::Flagged, MotionStatus::Left].iter().position(|s| *s == status)
-    };
     groups.sort_by(|a, b| rank(a.status).cmp(&rank(b.status)).then(b.outcomes.len().cmp(&a.outcomes.len())));
     groups
 }
 
-/// A reason without the numbers of a single motion, and its value.
-fn split_reason(reason: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
-    let plain = |text: &str| (text.to_owned(), None);
-    let sized = |text: String, value: f64, unit| (text, Some((value, unit)).filter(|_| value.is_finite()));
-    match *reason {
-        OutcomeReason::Inverse(InverseError::Unreachable { beyond_mm }) => {
-            sized("target is out of reach".to_owned(), beyond_mm, "mm")
-        }
-        OutcomeReason::Inverse(InverseError::OtherConfiguration { .. }) => {
-            plain("target is not reachable in its configuration")
-        }
-        OutcomeReason::Inverse(InverseError::OtherBranch { .. }) => {
-            plain("target is reachable only in another configuration")
-        }
-        OutcomeReason::Inverse(InverseError::Abandoned) => {
-            plain("the search for its joints was abandoned: too many targets needed a search")
-        }
-        OutcomeReason::Inverse(InverseError::NotConverged { .. }) => {
-            plain("inverse kinematics did not converge")
-        }
-        OutcomeReason::CorrectionTooLarge { mm } => {
-            sized("correction exceeds the bound (--max-correction)".to_owned(), mm, "mm")
-        }
-        OutcomeReason::RotationTooLarge { deg } => {
-            sized("correction of the orientation exceeds its limit".to_owned(), deg, "°")
-        }
-        OutcomeReason::JointJump { joint, deg, on_the_way, .. } => sized(
-            format!(
-                "{}the correction would turn joint {} too far near a singularity",
-                if on_the_way { "on the path to it, " } else { "" },
-                joint + 1
-            ),
-            deg,
-            "°",
-        ),
-        OutcomeReason::PathDeviation { mm } => {
-            sized("path between the targets deviates from the intended one".to_owned(), mm, "mm")
-        }
-        OutcomeReason::CornerDeviation { mm } => sized(
-            "the rounded corner before it deviates from the intended one: round it less (zone, path tolerance)"
-                .to_owned(),
-            mm,
-            "mm",
-        ),
-        OutcomeReason::AmbiguousCentre { mm } => sized(
-            "an arc of about half a turn programmed by its radius: the written decimals leave its centre ambiguous; state the centre \
-             instead (I, J, K; CC)"
-                .to_owned(),
-            mm,
-            "mm",
-        ),
-        OutcomeReason::TooFast { joint, ratio } => sized(
-            format!("joint {} would exceed its speed limit at the programmed speed", joint + 1),
-            ratio,
-            "× limit",
-        ),
-        OutcomeReason::JointNotMeasured { joint, by_deg } => sized(
-            format!("joint {} is outside the range in which the arm was measured", joint + 1),
-            by_deg,
-            "°",
-        ),
-        OutcomeReason::StartOfUnchangedCut { .. } => plain(
-            "a cut that remains unmodified starts where it ends: from a corrected start the first line of the cut would become a wedge",
-        ),
-        OutcomeReason::PartOfCut { because, .. } => plain(&format!(
-            "a cut is corrected as a whole or not at all, and another motion of this cut is not corrected: {because}"
-        )),
-        OutcomeReason::Step { mm, .. } => sized(
-            "the step to an uncorrected motion of the same cut would exceed --tolerance".to_owned(),
-            mm,
-            "mm",
-        ),
-        OutcomeReason::Risk { chance } => sized(
-            "the correction makes the cut worse with a probability above --max-risk".to_owned(),
-            100.0 * chance,
-            "%",
-        ),
-        OutcomeReason::NotCovered { ratio } => sized("far from all measured poses".to_owned(), ratio, "×"),
-        OutcomeReason::Uncertain { sigma_mm } => {
-            sized("the model is uncertain here".to_owned(), sigma_mm, "mm σ")
-        }
-        ref other => (other.to_string(), None),
-    }
-}
-
-fn worst_text(value: f64, unit: &str) -> String {
-    match unit {
-        "°" => format!("{value:.2}°"),
-        "×" => format!("{value:.1} × the usual distance"),
-        "× limit" => format!("{value:.2} × its limit"),
-        "%" => format!("{value:.0} %"),
-        unit => format!("{value:.3} {unit}"),
-    }
+fn rank(status: MotionStatus) -> Option<usize> {
+    [MotionStatus::Refused, MotionStatus::Flagged, MotionStatus::Left].iter().position(|s| *s == status)
 }
 
 /// Lines as ranges of successive motions, grouped by file if there are several: `a.mod 12–14, 20; b.mod 3 and 7 more motions`.

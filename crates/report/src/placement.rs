@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 
 use super::table::{Column, Table};
 use truegrind_calibration::identification::verdict::percent_of;
-use truegrind_compensation::deviation::Status;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
@@ -42,7 +41,7 @@ pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
     plan.placements.iter().map(of).chain(apart).collect()
 }
 
-/// What is said where the placement over some stationary objects is corrected and over others is not: the distances between them change.
+/// Sentence for stationary objects of which some are corrected in placement and others are not: the distances between them change.
 fn apart(plan: &Plan, what: &str, is_corrected: impl Fn(&ObjectPlacement) -> bool) -> Option<String> {
     let stand = || plan.placements.iter().filter(|placement| !placement.held && is_corrected(placement));
     let of = |applied: Placement| -> Vec<&str> {
@@ -53,8 +52,8 @@ fn apart(plan: &Plan, what: &str, is_corrected: impl Fn(&ObjectPlacement) -> boo
     let most_mm = moved_mm.map(|placement| placement.deviation_mm).fold(0.0, f64::max);
     (!moved.is_empty() && !kept.is_empty()).then(|| {
         format!(
-            "the placement over {} is corrected, over {} it is not: the path over the one is displaced against the other by up to {most_mm:.3} mm. \
-             If these {what}s belong together, give them one user frame, or decide for both (--placement shape, --placement absolute)",
+            "the placement is corrected for {} but not for {}: the two shift against each other by up to {most_mm:.3} mm. If these {what}s belong \
+             together, give them one user frame, or choose --placement shape or --placement absolute for both",
             moved.join(", "),
             kept.join(", ")
         )
@@ -96,15 +95,14 @@ fn sentence(placement: &ObjectPlacement, what: &str) -> String {
     }
     if *unlocated {
         return format!(
-            "{named}: only the shape is corrected, not the placement, since the {what} was taught with this arm and its \
-             teaching points are not given; with them (cell file, teaching_deg) the placement becomes known; --placement absolute \
+            "{named}: only the shape is corrected, since the {what} was taught with this arm and its teaching points are missing; give them in the cell \
+             file (teaching_deg) to correct the placement too; --placement absolute \
              takes the programmed frame as exact"
         );
     }
     let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(
-        "{named}: only the shape is corrected, not the placement; {known}; correcting that too would make the path worse \
-         with a probability of {}; {remedy}--placement absolute corrects it anyway",
+        "{named}: only the shape is corrected; {known}; correcting the placement too would make the path worse with a probability of {}; {remedy}--placement absolute corrects it anyway",
         percent_of(*probability_of_harm)
     )
 }
@@ -186,7 +184,7 @@ pub fn left_at_risk(plan: &Plan) -> (usize, usize) {
 }
 
 fn rewritten(plan: &Plan) -> impl Iterator<Item = &MotionOutcome> {
-    plan.outcomes.iter().filter(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
+    plan.outcomes.iter().filter(|outcome| outcome.status.is_written())
 }
 
 /// Largest uncorrected deviation of all motions (mm).
@@ -237,11 +235,15 @@ pub fn risk(plan: &Plan) -> Option<String> {
         plan.cuts.iter().filter(|cut| cut.corrected).map(|cut| cut.probability_of_harm).fold(0.0, f64::max);
     Some(format!(
         "probability that the corrected cuts together deviate more than the uncorrected ones: {all}; for any single cut: {}",
-        match percent_of(largest) {
-            small if small.starts_with("under") => small,
-            other => format!("at most {other}"),
-        }
+        at_most(largest)
     ))
+}
+
+/// A probability as an upper bound.
+fn at_most(probability: f64) -> String {
+    let percent = percent_of(probability);
+    // At both ends it is a bound by itself.
+    if (0.001..=0.999).contains(&probability) { format!("at most {percent}") } else { percent }
 }
 
 fn remedy_json(remedy: &Remedy, what: &str) -> Value {

@@ -331,5 +331,5 @@ fn a_program_with_fewer_motions_was_not_rewritten_from_the_intended_one() {
     let arguments = ["deviation", "shorter.mod", "--intended", "blade.mod", "--model", "model.toml"];
     let (code, out, err) = truegrind(at, &arguments);
     assert_eq!(code, 2, "{out}");
-    assert!(err.contains("447 motions") && err.contains("--intended 448"), "{err}");
+    assert!(err.contains("447 motions") && err.contains("--intended has 448"), "{err}");
 }

@@ -240,7 +240,7 @@ fn dry_run_check_and_diff_write_no_program() {
     // It was asked for, but nobody knows what deviates now.
     assert_eq!(code, 1, "{err}");
     assert!(err.contains("add up"), "{err}");
-    assert!(out.contains("[warning] Corrected once more") && !out.contains("expected after"), "{out}");
+    assert!(out.contains("[warning] Corrected a second time") && !out.contains("expected after"), "{out}");
     let marked = fs::read_to_string(at.join("c.mod")).unwrap();
     assert_eq!(marked.matches("truegrind 0").count(), 1, "one mark, of the new model: {marked}");
     // A fragment carries no mark, and that is said.

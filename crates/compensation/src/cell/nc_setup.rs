@@ -1,6 +1,6 @@
 //! What cell file and robot file state that NC programs do not: control, angle convention, tools and work offsets.
 
-use crate::cell::{Cell, CellFrame};
+use super::file::{Cell, CellFrame};
 use truegrind_arm::robots::sheet::Orientation;
 use truegrind_programs::motion::Frame;
 use truegrind_programs::nc::orientation::Angles;

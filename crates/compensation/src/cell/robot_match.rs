@@ -1,6 +1,6 @@
 //! Whether cell, program and model belong to the same robot: a correction for another arm is wrong.
 
-use crate::cell::Cell;
+use super::file::Cell;
 use crate::plan::Plan;
 use crate::plan::reason::OutcomeReason;
 use truegrind_arm::inverse::InverseError;

@@ -71,7 +71,7 @@ pub fn cell_template(programs: &[TemplateProgram<'_>], robot: Option<&str>) -> C
             .filter(|((kind, _), _)| *kind == is_tool)
             .for_each(|(_, named)| out.frame(is_tool, named));
     }
-    let of_blocks = programs.iter().flat_map(|program| program.listing.other_axes.keys());
+    let of_blocks = programs.iter().flat_map(|program| program.listing.nc.other_axes.keys());
     let of_blocks: BTreeSet<char> = of_blocks.map(char::to_ascii_lowercase).collect();
     let of_targets = ('a'..='f').enumerate().filter(|(axis, _)| axes[*axis]).map(|(_, letter)| letter);
     for letter in of_targets.chain(of_blocks) {
@@ -181,7 +181,7 @@ impl Writer {
                 "joints (°), roughly, in which the arm starts: NC states none",
             );
         }
-        if programs.iter().any(|program| !program.listing.open_controls.is_empty()) {
+        if programs.iter().any(|program| !program.listing.nc.open_controls.is_empty()) {
             let words = Dialect::WORDS.map(|(word, _)| word).join(" | ");
             self.ask("control", &format!("which control runs the programs: {words}"));
         }

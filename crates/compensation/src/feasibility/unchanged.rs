@@ -9,7 +9,7 @@ use crate::feasibility::approaches;
 use crate::feasibility::arc_feasibility::infeasible_arcs;
 use crate::feasibility::half_turns::half_turns;
 use crate::feasibility::joint_lines::lines_without_start;
-use crate::feasibility::singularity::forbid_segments;
+use crate::feasibility::segment_checker::forbid_segments;
 use crate::frames::frame_table::FrameTable;
 use crate::options::Options;
 use crate::plan::reason::OutcomeReason;

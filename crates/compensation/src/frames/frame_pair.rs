@@ -118,14 +118,12 @@ impl FrameNote {
         let about = if several { "up to about" } else { "about" };
         let estimate = match self.taught {
             None => return self.said.clone(),
-            Some(WouldMove::Unknown) => {
-                "how far it would move had it been taught cannot be estimated here".to_owned()
-            }
+            Some(WouldMove::Unknown) => "its shift, if it was taught, cannot be estimated here".to_owned(),
             Some(WouldMove::Tool { mm }) => {
-                format!("had it been taught with this arm, its TCP would move by {about} {mm:.2} mm")
+                format!("if it was taught with this arm, its TCP is off by {about} {mm:.2} mm")
             }
             Some(WouldMove::Object { mm, deg }) => {
-                format!("had it been taught with this arm, it would move by {about} {mm:.2} mm and {deg:.3}°")
+                format!("if it was taught with this arm, it is off by {about} {mm:.2} mm and {deg:.3}°")
             }
         };
         format!("{}; {estimate}", self.said)
@@ -221,15 +219,13 @@ fn tool_note(
                 "tool {name} was taught: re-evaluated, its TCP moves by {shift:.3} mm"
             )),
             None => FrameNote {
-                said: format!(
-                    "tool {name} was taught, but its teaching points are not given: taken as exact"
-                ),
+                said: format!("tool {name} was taught, but its teaching points are missing: assumed exact"),
                 taught: Some(tool_estimate(commanded, with)),
             },
         }),
         None if built_in(name) => None,
         None => Some(FrameNote {
-            said: format!("tool {name}: origin not stated, taken as metrology (exact)"),
+            said: format!("tool {name}: origin not stated, assumed exact (metrology)"),
             taught: Some(tool_estimate(commanded, with)),
         }),
     }
@@ -256,14 +252,14 @@ fn object_note(
         }
         Some(_) => Some(FrameNote {
             said: format!(
-                "{what} {name} was taught, but its teaching points are not given: only an absolute placement takes it as exact"
+                "{what} {name} was taught, but its teaching points are missing: its true place is unknown (--placement absolute takes it as exact)"
             ),
             taught: Some(object_estimate(commanded, with)),
         }),
         None if built_in(name) => None,
         None => Some(FrameNote {
             said: format!(
-                "{what} {name}: origin not stated, taken as metrology (exact {})",
+                "{what} {name}: origin not stated, assumed exact {} (metrology)",
                 if commanded.holds_part { "on the flange" } else { "in the robot's base" }
             ),
             taught: Some(object_estimate(commanded, with)),

@@ -193,13 +193,13 @@ impl FrameTable {
 
     /// The same for the axes that blocks of NC programs name. Their values are not read: what they carry must be stated.
     fn axes_of_blocks(&mut self, listing: &Listing, cell: &Cell) {
-        for (&letter, place) in &listing.other_axes {
+        for (&letter, place) in &listing.nc.other_axes {
             let index = AXES.iter().position(|axis| axis.eq_ignore_ascii_case(&letter));
             match index.and_then(|index| cell.carries(index)) {
                 Some(Carries::Base) => self.base_of_blocks = index,
                 Some(Carries::Other) => {}
                 None => {
-                    let lines = numbered(listing, [*place].into_iter()).unwrap_or_default();
+                    let lines = numbered(&listing.files, [*place].into_iter()).unwrap_or_default();
                     self.unstated_axes.push(letter);
                     self.assumed.push(format!(
                         "axis {letter} ({lines}): assumed not to carry the robot's base; state what it carries (cell file, [[external]])"

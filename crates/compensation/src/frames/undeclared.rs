@@ -73,8 +73,7 @@ pub(crate) fn notes(listing: &Listing, language: Language) -> Vec<String> {
         };
         let remedy = match language {
             Language::Rapid => {
-                "give the module that declares it beside this one, or the whole folder with --together"
-                    .to_owned()
+                "give the module that declares it too, or the whole folder with --together".to_owned()
             }
             Language::Nc => format!(
                 "state its pose in a cell file (--cell): [[{key}]] name = \"{}\", origin = \"metrology\", \
@@ -90,10 +89,7 @@ pub(crate) fn notes(listing: &Listing, language: Language) -> Vec<String> {
     let all = undeclared(listing);
     let mut out: Vec<String> = all.iter().take(NAMED).map(sentence).collect();
     if all.len() > NAMED {
-        out.push(format!(
-            "and {} more tools and work objects are declared in none of the files",
-            all.len() - NAMED
-        ));
+        out.push(format!("and {} more tools and work objects that no file declares", all.len() - NAMED));
     }
     out
 }

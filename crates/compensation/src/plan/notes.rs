@@ -1,8 +1,9 @@
 //! Notes of a plan: what was not checked, what was assumed, and how backlash and payload enter.
 
+use std::collections::HashMap;
+
 use crate::arms::Arms;
 use crate::condition::payload::{is_load_dependent, payload_at};
-use crate::deviation::Status;
 use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
 use crate::plan::MotionOutcome;
@@ -43,7 +44,7 @@ pub(crate) fn doubtful_effects_note(arms: &Arms<'_>) -> Option<String> {
         })
         .collect();
     (!named.is_empty())
-        .then(|| format!("doubtful, therefore not corrected, but included in every σ: {}", named.join(", ")))
+        .then(|| format!("not certain, so counted in every σ but not corrected: {}", named.join(", ")))
 }
 
 /// How many times the largest σ an error beyond the noise is from which it is stated.
@@ -54,8 +55,8 @@ pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item =
     let largest = sigmas_mm.reduce(f64::max)?;
     let beyond = arms.knowledge?.beyond_noise_mm.filter(|mm| *mm > BEYOND_SIGMA * largest)?;
     Some(format!(
-        "the readings deviate from this model by {beyond:.3} mm RMS beyond their noise, from effects that it does not contain: programs may be \
-         off by as much, which no σ here contains; `truegrind diagnose` looks for the causes"
+        "the measurement deviates from this model by {beyond:.3} mm RMS more than noise explains: programs may be off by as much beyond every σ \
+         stated here; `truegrind diagnose` looks for the causes"
     ))
 }
 
@@ -63,8 +64,8 @@ pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item =
 pub(crate) fn several_starts_note(listing: &Listing, motions: &[u32]) -> Option<String> {
     let lines = lines_of(listing, motions)?;
     Some(format!(
-        "{} at several places: the path from each is checked against --tolerance, and nothing is inserted; joint limits, singularities and speeds \
-         on the way are not checked ({lines})",
+        "{} at more than one place: the path from each was checked against --tolerance, but not for joint limits, singularities or speed, and no \
+         targets were inserted ({lines})",
         counted(motions.len(), "line or arc may start", "lines or arcs may start")
     ))
 }
@@ -78,7 +79,7 @@ pub(crate) fn unchecked_notes(
     let mut out = Vec::new();
     if let Some(lines) = lines_of(listing, unchecked) {
         out.push(format!(
-            "{} at a place that is unknown or not corrected: the end is correct, the path to it is not checked ({lines})",
+            "{} at a place that is unknown or not corrected: the end is corrected, the path to it is not checked ({lines})",
             counted(unchecked.len(), "line or arc starts", "lines or arcs start")
         ));
     }
@@ -90,8 +91,8 @@ pub(crate) fn unchecked_notes(
         .collect();
     if let Some(lines) = lines_of(listing, &by_persistent) {
         out.push(format!(
-            "{} offset by persistent data (PERS), which the program keeps: the correction is that for the values in the files, and nothing is \
-             inserted beside ({lines})",
+            "{} offset by persistent data (PERS): corrected for the values in the files; the offset stays in the program, and no targets are inserted \
+             ({lines})",
             counted(by_persistent.len(), "motion is", "motions are")
         ));
     }
@@ -100,16 +101,16 @@ pub(crate) fn unchecked_notes(
         .collect();
     if let Some(lines) = lines_of(listing, &to_persistent) {
         out.push(format!(
-            "{} to persistent targets (PERS): the correction is that for the values in the files, and what an operator or another task \
-             writes there later is not corrected ({lines})",
+            "{} to persistent targets (PERS): corrected for the values in the files; values that an operator or another task writes later are not \
+             ({lines})",
             counted(to_persistent.len(), "motion goes", "motions go")
         ));
     }
-    if let Some(lines) = lines_of(listing, &listing.external_calls) {
+    if let Some(lines) = lines_of(listing, &listing.nc.external_calls) {
         out.push(format!(
             "{} not in the same file: it is assumed to leave work offset, shifts, tool, units and tool centre point control \
              unchanged ({lines})",
-            counted(listing.external_calls.len(), "block calls a program that is", "blocks call a program that is")
+            counted(listing.nc.external_calls.len(), "block calls a program that is", "blocks call a program that is")
         ));
     }
     out.extend(outside_calls_note(listing));
@@ -132,14 +133,14 @@ pub(crate) fn unchecked_notes(
         let count = solved.guessed.len();
         out.push(if listing.numbered {
             format!(
-                "before {} the position of the arm is unknown, and no NC word states the configuration: wrist in front, elbow not turned back, joints nearest to zero are assumed, unchecked \
-                 ({lines}); state where the arm starts, in the cell file (start_deg) or in a comment (truegrind start [q1,…,q6])",
+                "the position of the arm before {} is unknown, and NC states no configuration. Assumed, unchecked: wrist in front, elbow not turned \
+                 back, joints nearest to zero ({lines}). State where the arm starts, in the cell file (start_deg) or in a comment (truegrind start [q1,…,q6])",
                 counted(count, "motion", "motions")
             )
         } else {
             format!(
-                "{}, unchecked, to the configuration next to where the arm stands (ConfL \\Off, ConfJ \\Off), which is unknown \
-                 there: the one that matches the stated quarter turns best is assumed ({lines})",
+                "{} from an unknown start with the configuration not monitored (ConfL \\Off, ConfJ \\Off). Assumed, unchecked: the configuration that matches \
+                 the stated quarter turns best ({lines})",
                 counted(count, "motion goes", "motions go")
             )
         });
@@ -147,39 +148,39 @@ pub(crate) fn unchecked_notes(
     out
 }
 
-/// Calls of routines that are in none of the files, and what is assumed of them.
 /// NC files of which nothing shows the control, on which the meaning of X, Y, Z depends.
 fn open_control_note(listing: &Listing) -> Option<String> {
-    let lines = numbered(listing, listing.open_controls.iter().copied())?;
+    let lines = numbered(&listing.files, listing.nc.open_controls.iter().copied())?;
     Some(format!(
-        "no word shows for which control the program is written: it is read as ISO 6983 with the tip of the tool at X Y Z, and numbers \
-         without a decimal point as mm (from {lines}); a Fanuc reads both otherwise. State the control in a comment of the program: \
+        "nothing says which control the program is for. It was read as ISO 6983: X Y Z are the tool tip, and numbers without a decimal point are \
+         mm (from {lines}). A Fanuc reads both differently. State the control in a comment of the program: \
          (truegrind control fanuc), or linuxcnc, siemens, heidenhain, iso"
     ))
 }
 
+/// Calls of routines that are in none of the files, and what is assumed of them.
 fn outside_calls_note(listing: &Listing) -> Option<String> {
     /// How many routines are named.
     const NAMED: usize = 5;
     let mut routines: Vec<(&str, Vec<Place>)> = Vec::new();
+    let mut index_of: HashMap<String, usize> = HashMap::new();
     for call in &listing.outside_calls {
-        let name = call.name.as_str();
-        match routines.iter_mut().find(|(other, _)| other.eq_ignore_ascii_case(name)) {
-            Some((_, places)) => places.push(call.place),
-            None => routines.push((name, vec![call.place])),
-        }
+        let index = *index_of.entry(call.name.to_ascii_lowercase()).or_insert_with(|| {
+            routines.push((call.name.as_str(), Vec::new()));
+            routines.len() - 1
+        });
+        routines[index].1.push(call.place);
     }
     let named = routines.iter().take(NAMED).filter_map(|(name, places)| {
-        Some(format!("{name} ({})", numbered(listing, places.iter().copied())?))
+        Some(format!("{name} ({})", numbered(&listing.files, places.iter().copied())?))
     });
     let named: Vec<String> = named.collect();
     let more = routines.len().saturating_sub(NAMED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     (!named.is_empty()).then(|| {
         format!(
-            "routines that are in none of the files are called: {}{more}; they are assumed to leave unchanged the tools, work objects and \
-             targets that the files declare, the numbers that compute these, the program displacement, the switches (ConfL, SingArea, SoftAct and so on) and the load; \
-             give the modules that declare them too (--together)",
+            "routines missing from the files are called: {}{more}. They are assumed not to change tools, work objects and targets of the files, or \
+             numbers behind these, program displacement, switches (ConfL, SingArea, SoftAct …) or load; give their modules too (--together)",
             named.join(", ")
         )
     })
@@ -200,8 +201,7 @@ fn grams(kg: f64) -> f64 {
 pub(crate) fn unknown_loads(arms: &Arms<'_>, options: &Options, outcomes: &[MotionOutcome]) -> usize {
     let load_dependent = arms.estimated.arm().model.effects.iter().any(is_load_dependent);
     let Some(loads) = options.loads.as_ref().filter(|_| load_dependent) else { return 0 };
-    let is_corrected = |outcome: &&MotionOutcome| matches!(outcome.status, Status::Changed | Status::Flagged);
-    let corrected = outcomes.iter().filter(is_corrected);
+    let corrected = outcomes.iter().filter(|outcome| outcome.status.is_written());
     corrected.filter(|outcome| loads.grip(outcome.motion as usize) == Grip::Unknown).count()
 }
 

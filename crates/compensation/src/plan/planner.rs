@@ -117,7 +117,7 @@ impl<'a> SolvedProgram<'a> {
         plan.cuts.clone_from(&assessment.cuts);
         let rewritten = |motion: &u32| {
             let outcome = plan.outcomes.get(*motion as usize);
-            outcome.is_some_and(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
+            outcome.is_some_and(|outcome| outcome.status.is_written())
         };
         for cut in &mut plan.cuts {
             cut.corrected = cut.motions.iter().any(rewritten);
@@ -163,10 +163,9 @@ impl<'a> SolvedProgram<'a> {
             }
             refused.extend(more);
         }
-        // No agreement was reached: every round pinned more motions, so the whole program remains
-        // unmodified.
+        // Every round pinned more motions, so the whole program remains unmodified.
         for motion in 0..listing.motions.len() as u32 {
-            refused.entry(motion).or_insert(OutcomeReason::Inverse(InverseError::Abandoned));
+            refused.entry(motion).or_insert(OutcomeReason::NoConsistentPlan);
         }
         refused
     }
@@ -472,7 +471,7 @@ fn plan_motion<'a>(
     let motion = &listing.motions[index];
     let mut outcome = MotionOutcome::left(index as u32);
     let finish = |mut outcome: MotionOutcome,
-                  status,
+                  status: Status,
                   reason: Option<OutcomeReason>,
                   change,
                   point: Option<Box<PathPoint>>| {
@@ -481,7 +480,7 @@ fn plan_motion<'a>(
         let point = point.map(|mut p| {
             p.status = status;
             p.reason = reason.map(|r| r.to_string());
-            if !matches!(status, Status::Changed | Status::Flagged) {
+            if !status.is_written() {
                 (p.after, p.joints_after) = (p.before, p.joints_before);
             }
             p

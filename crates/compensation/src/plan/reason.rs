@@ -154,6 +154,8 @@ pub enum OutcomeReason {
     },
     /// An air move beside a cut that remains unmodified, whose lines would take their omitted axes from it.
     AirMoveAlone,
+    /// Every motion that was left out kept others from being corrected, until none was left to leave out.
+    NoConsistentPlan,
     /// An adjacent motion of the same cut remains unmodified, and the step to it would be too large.
     Step {
         /// Line of that motion, 1-based.
@@ -188,109 +190,86 @@ impl OutcomeReason {
         }
     }
 
-    /// Text of the reasons that pin an endpoint because a later unmodified motion starts there.
-    fn before_one_that_stays(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            OutcomeReason::HalfTurn { line } => write!(
-                f,
-                "on line {line} the tool turns by about half a turn: after the correction the controller might turn it the other way; put \
-                 a target between"
-            ),
-            OutcomeReason::StartOfUnchangedArc { line } => write!(
-                f,
-                "the circular motion of line {line} remains unmodified and starts here: from a corrected start it would be a \
-                 different circle"
-            ),
-            OutcomeReason::StartOfUnchangedCut { line } => write!(
-                f,
-                "the cut of line {line} remains unmodified and starts here: from a corrected start its first line would become a wedge"
-            ),
-            OutcomeReason::StartOfSingularPath { line } => write!(
-                f,
-                "the motion of line {line} remains unmodified and starts here: from a corrected start it would pass too close to \
-                 a singularity"
-            ),
-            OutcomeReason::StartOfLimitedPath { line, what } => write!(
-                f,
-                "the motion of line {line} remains unmodified and starts here: from a corrected start {what} would exceed its \
-                 limits on the way"
-            ),
-            _ => Ok(()),
-        }
-    }
-
-    /// The reason without the figures of one motion, for counting.
+    /// The reason without the figures of one motion, for counting. `Display` adds them.
     pub fn kind(&self) -> &'static str {
         match self {
             OutcomeReason::Program(reason) => reason.text(),
-            OutcomeReason::MovingBase { .. } => "an external axis carries the robot's base",
-            OutcomeReason::CellContradiction => "cell file and program contradict each other",
-            OutcomeReason::JointTarget => "a joint target",
-            OutcomeReason::NoChange => "nothing to change",
-            OutcomeReason::Inverse(InverseError::Unreachable { .. }) => "out of reach",
-            OutcomeReason::Inverse(
-                InverseError::OtherConfiguration { .. } | InverseError::OtherBranch { .. },
-            ) => "not reachable in its configuration",
-            OutcomeReason::Inverse(InverseError::Abandoned) => "the search budget of the program was used up",
-            OutcomeReason::Inverse(_) => "no joint solution was found",
-            OutcomeReason::OutsideLimits { .. } => "a joint would exceed its limits",
-            OutcomeReason::PathOutsideLimits { .. } => "a joint would exceed its limits on the way",
-            OutcomeReason::CorrectionTooLarge { .. } => "correction exceeds the bound (--max-correction)",
-            OutcomeReason::RotationTooLarge { .. } => "correction of the orientation exceeds the bound",
-            OutcomeReason::NearSingularity => "too close to a singularity",
-            OutcomeReason::OtherBranch => "the corrected target lies in another configuration",
-            OutcomeReason::PathDeviation { .. } => "the path between targets deviates from the intended one",
-            OutcomeReason::CornerDeviation { .. } => "the rounded corner deviates from the intended one",
-            OutcomeReason::AmbiguousCentre { .. } => {
-                "the radius of a half circle leaves its centre ambiguous"
-            }
-            OutcomeReason::CircleKept => "the circle was kept",
-            OutcomeReason::HalfTurn { .. } => "the tool turns by about half a turn along a line",
-            OutcomeReason::LineWithoutStart => {
-                "a line with an unknown or uncorrected start cannot be written as joints"
-            }
-            OutcomeReason::TooFast { .. } => "a joint exceeds its speed limit",
-            OutcomeReason::NoCircle => "no circle through its points follows the intended path",
-            OutcomeReason::StartOfUnchangedArc { .. } => "an unmodified circular motion starts where it ends",
-            OutcomeReason::StartOfUnchangedCut { .. } => "a cut that remains unmodified starts where it ends",
-            OutcomeReason::StartOfSingularPath { .. } => {
-                "an unmodified motion near a singularity starts where it ends"
-            }
-            OutcomeReason::StartOfLimitedPath { .. } => {
-                "a joint would exceed its limits on an unmodified motion that starts here"
-            }
-            OutcomeReason::FullCircle => "a full circle",
-            OutcomeReason::JointNotMeasured { .. } => {
-                "a joint is outside the range in which the arm was measured"
-            }
-            OutcomeReason::JointJump { .. } => "near a singularity the correction turns a joint too far",
-            OutcomeReason::SingularPath => "the path to it passes too close to a singularity",
-            OutcomeReason::AmbiguousBranch => "the controller's choice of configuration is ambiguous",
-            OutcomeReason::UnknownStart => {
-                "corrected for the stated configuration, which is not checked, from an unknown start"
-            }
-            OutcomeReason::PartOfCut { because, .. } => because,
-            OutcomeReason::Step { .. } => "the step to its neighbour is too large",
-            OutcomeReason::AirMoveAlone => "an air move beside a cut that is not corrected",
-            OutcomeReason::Risk { .. } => "the correction is too likely to make the cut worse (--max-risk)",
-            OutcomeReason::NotCovered { .. } => "no measured pose is nearby",
-            OutcomeReason::Uncertain { .. } => "the model is uncertain here",
-        }
-    }
-
-    /// The whole sentence, where it contains no figures and says more than [`Self::kind`].
-    fn sentence(&self) -> Option<&'static str> {
-        Some(match self {
-            OutcomeReason::NoChange => "its numbers are already right to the last written decimal",
-            OutcomeReason::JointTarget => {
-                "joint target: states joints, not a pose (--joint-targets rewrites it too)"
+            OutcomeReason::MovingBase { .. } => {
+                "an external axis carries the robot's base, whose position is not modelled"
             }
             OutcomeReason::CellContradiction => {
                 "cell file and program disagree about its tool or work object"
             }
-            OutcomeReason::AirMoveAlone => {
-                "an air move beside a cut that is not corrected: the lines of the cut would begin elsewhere and take the axes that they \
-                 omit from it"
+            OutcomeReason::JointTarget => {
+                "joint target: states joints, not a pose (--joint-targets rewrites it too)"
+            }
+            OutcomeReason::NoChange => "its numbers are already right to the last written decimal",
+            OutcomeReason::Inverse(InverseError::Unreachable { .. }) => "target is out of reach",
+            OutcomeReason::Inverse(InverseError::OtherConfiguration { .. }) => {
+                "target is not reachable in its configuration"
+            }
+            OutcomeReason::Inverse(InverseError::OtherBranch { .. }) => {
+                "target is reachable only in another configuration"
+            }
+            OutcomeReason::Inverse(InverseError::Abandoned) => {
+                "the search for its joints was stopped: too many targets of this program need a search"
+            }
+            OutcomeReason::Inverse(_) => "no joint solution was found",
+            OutcomeReason::OutsideLimits { .. } => "a joint would exceed its limits",
+            OutcomeReason::PathOutsideLimits { .. } => {
+                "a joint would exceed its limits on the corrected path to it"
+            }
+            OutcomeReason::CorrectionTooLarge { .. } => "correction exceeds the bound (--max-correction)",
+            OutcomeReason::RotationTooLarge { .. } => "correction of the orientation exceeds the bound",
+            OutcomeReason::NearSingularity => "too close to a singularity",
+            OutcomeReason::OtherBranch => "the corrected target lies in another configuration",
+            OutcomeReason::PathDeviation { mm } if !mm.is_finite() => "the arm cannot follow the path to it",
+            OutcomeReason::PathDeviation { .. } => "the path to it deviates from the intended one",
+            OutcomeReason::CornerDeviation { mm } if !mm.is_finite() => {
+                "the arm cannot follow the rounded corner before it: round it less (zone, path tolerance)"
+            }
+            OutcomeReason::CornerDeviation { .. } => {
+                "the rounded corner before it deviates from the intended one: round it less (zone, path tolerance)"
+            }
+            OutcomeReason::AmbiguousCentre { .. } => {
+                "an arc of about half a turn programmed by its radius: the written decimals leave its centre ambiguous; state the centre \
+                 instead (I, J, K; CC)"
+            }
+            OutcomeReason::CircleKept => {
+                "the circle was kept: its start is unknown or not corrected, the instruction cannot be split, or no straight \
+                 segments follow it"
+            }
+            OutcomeReason::HalfTurn { .. } => {
+                "the tool turns by about 180° along a line: after the correction the controller might turn it the other way round; insert a \
+                 target halfway"
+            }
+            OutcomeReason::LineWithoutStart => {
+                "joint targets would not follow this line, since its start is unknown or not corrected: begin with a joint motion, add \
+                 --joint-targets, or drop --emit joints"
+            }
+            OutcomeReason::TooFast { .. } => "a joint exceeds its speed limit at the programmed speed",
+            OutcomeReason::NoCircle => "its three points make no circle that follows the intended path",
+            OutcomeReason::StartOfUnchangedArc { .. } => {
+                "a circular motion that is not corrected starts here: from a corrected start it would be a different circle"
+            }
+            OutcomeReason::StartOfUnchangedCut { .. } => {
+                "a cut that is not corrected starts here: correcting its start would tilt its first line"
+            }
+            OutcomeReason::StartOfSingularPath { .. } => {
+                "a motion that is not corrected starts here: from a corrected start it would pass too close to a singularity"
+            }
+            OutcomeReason::StartOfLimitedPath { .. } => {
+                "a motion that is not corrected starts here: from a corrected start a joint would exceed its limits on the way"
+            }
+            OutcomeReason::FullCircle => "a full circle: the path between its ends is not checked",
+            OutcomeReason::JointNotMeasured { .. } => {
+                "a joint is outside the range in which the arm was measured"
+            }
+            OutcomeReason::JointJump { on_the_way: false, .. } => {
+                "the correction would turn a joint too far, since the arm is near a singularity: move the path away from it"
+            }
+            OutcomeReason::JointJump { on_the_way: true, .. } => {
+                "on the way to it the correction would turn a joint too far, since the arm is near a singularity: move the path away from it"
             }
             OutcomeReason::SingularPath => "the corrected path to it passes too close to a singularity",
             OutcomeReason::AmbiguousBranch => {
@@ -298,38 +277,146 @@ impl OutcomeReason {
                  configuration, or add a target closer to this one"
             }
             OutcomeReason::UnknownStart => {
-                "its configuration is not checked (ConfL \\Off, ConfJ \\Off): the controller selects the one next to where the arm \
-                 stands, and the program does not determine its start. It is corrected for the stated configuration, or the \
-                 one that continues from there: check it, or begin with a joint target"
+                "its configuration is not monitored (ConfL \\Off, ConfJ \\Off): it depends on where the arm comes from, which the program does \
+                 not say. Corrected for the stated configuration, or for the one that continues from there: check it, or begin with a joint \
+                 target"
             }
-            OutcomeReason::PathDeviation { mm } if !mm.is_finite() => "the arm cannot follow the path to it",
-            OutcomeReason::CornerDeviation { mm } if !mm.is_finite() => {
-                "the arm cannot follow the rounded corner before it: round it less (zone, path tolerance)"
+            OutcomeReason::PartOfCut { because, .. } => because,
+            OutcomeReason::Step { .. } => {
+                "the step to an uncorrected motion of the same cut would exceed --tolerance"
             }
-            OutcomeReason::CircleKept => {
-                "the circle was kept: its start is unknown or not corrected, the instruction cannot be split, or no straight \
-                 segments follow it"
+            OutcomeReason::AirMoveAlone => {
+                "an air move next to a cut that is not corrected: correcting it would move the start of the cut, and the axes that its blocks \
+                 omit"
             }
-            OutcomeReason::LineWithoutStart => {
-                "its start is unknown or not corrected, so joints would make another path than this line: begin with a joint motion, rewrite \
-                 joint targets too (--joint-targets), or write targets (without --emit joints)"
+            OutcomeReason::NoConsistentPlan => {
+                "no consistent plan was found: each motion that was not corrected kept others from being corrected; divide the program"
             }
-            OutcomeReason::NoCircle => {
-                "its three points make no circle, or none that follows the intended path"
+            OutcomeReason::Risk { .. } => {
+                "the correction would make this cut worse with a probability above --max-risk: the arm was not measured well enough here"
             }
-            OutcomeReason::FullCircle => "a full circle: the path between its ends is not checked",
+            OutcomeReason::NotCovered { .. } => "no measured pose is nearby",
+            OutcomeReason::Uncertain { .. } => "the model is uncertain here",
+        }
+    }
+
+    /// What of the reason can be more or less, for the worst of several motions; `None` where nothing can or it is not finite.
+    pub fn figure(&self) -> Option<Figure> {
+        let figure = match *self {
+            OutcomeReason::Inverse(InverseError::Unreachable { beyond_mm }) => {
+                Figure::Length { mm: beyond_mm }
+            }
+            OutcomeReason::CorrectionTooLarge { mm }
+            | OutcomeReason::PathDeviation { mm }
+            | OutcomeReason::CornerDeviation { mm }
+            | OutcomeReason::AmbiguousCentre { mm }
+            | OutcomeReason::Step { mm, .. } => Figure::Length { mm },
+            OutcomeReason::RotationTooLarge { deg }
+            | OutcomeReason::JointJump { deg, .. }
+            | OutcomeReason::JointNotMeasured { by_deg: deg, .. } => Figure::Angle { deg },
+            OutcomeReason::TooFast { ratio, .. } => Figure::OverLimit { ratio },
+            OutcomeReason::NotCovered { ratio } => Figure::OverSpacing { ratio },
+            OutcomeReason::Risk { chance } => Figure::Probability { chance },
+            OutcomeReason::Uncertain { sigma_mm } => Figure::Sigma { mm: sigma_mm },
             _ => return None,
-        })
+        };
+        Some(figure).filter(|figure| figure.value().is_finite())
+    }
+
+    /// Line of the other motion because of which this one is not corrected.
+    pub fn cause_line(&self) -> Option<u32> {
+        match *self {
+            OutcomeReason::PartOfCut { line, .. }
+            | OutcomeReason::Step { line, .. }
+            | OutcomeReason::HalfTurn { line }
+            | OutcomeReason::StartOfUnchangedArc { line }
+            | OutcomeReason::StartOfUnchangedCut { line }
+            | OutcomeReason::StartOfSingularPath { line }
+            | OutcomeReason::StartOfLimitedPath { line, .. } => Some(line),
+            _ => None,
+        }
+    }
+
+    /// The joint or the sum of joints that it is about.
+    pub fn limited(&self) -> Option<Limited> {
+        match *self {
+            OutcomeReason::OutsideLimits { what }
+            | OutcomeReason::PathOutsideLimits { what }
+            | OutcomeReason::StartOfLimitedPath { what, .. } => Some(what),
+            OutcomeReason::JointJump { joint, .. } => Some(Limited::Joint(joint)),
+            OutcomeReason::TooFast { joint, .. } | OutcomeReason::JointNotMeasured { joint, .. } => {
+                Some(Limited::joint(joint))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// A figure of a reason.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Figure {
+    /// A length.
+    Length {
+        /// In mm.
+        mm: f64,
+    },
+    /// A standard deviation.
+    Sigma {
+        /// In mm.
+        mm: f64,
+    },
+    /// An angle.
+    Angle {
+        /// In degrees.
+        deg: f64,
+    },
+    /// A speed over its limit.
+    OverLimit {
+        /// The ratio.
+        ratio: f64,
+    },
+    /// A distance over the usual one between measured poses.
+    OverSpacing {
+        /// The ratio.
+        ratio: f64,
+    },
+    /// A probability.
+    Probability {
+        /// From 0 to 1.
+        chance: f64,
+    },
+}
+
+impl Figure {
+    /// The number, in its own unit.
+    pub fn value(self) -> f64 {
+        match self {
+            Figure::Length { mm: value }
+            | Figure::Sigma { mm: value }
+            | Figure::Angle { deg: value }
+            | Figure::OverLimit { ratio: value }
+            | Figure::OverSpacing { ratio: value }
+            | Figure::Probability { chance: value } => value,
+        }
+    }
+}
+
+impl fmt::Display for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Figure::Length { mm } => write!(f, "{mm:.3} mm"),
+            Figure::Sigma { mm } => write!(f, "{mm:.3} mm σ"),
+            Figure::Angle { deg } => write!(f, "{deg:.2}°"),
+            Figure::OverLimit { ratio } => write!(f, "{ratio:.2} × its limit"),
+            Figure::OverSpacing { ratio } => write!(f, "{ratio:.1} × the usual distance"),
+            Figure::Probability { chance } => write!(f, "{:.0} %", 100.0 * chance),
+        }
     }
 }
 
 impl fmt::Display for OutcomeReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(sentence) = self.sentence() {
-            return f.write_str(sentence);
-        }
         match self {
-            OutcomeReason::Program(reason) => reason.fmt(f),
             OutcomeReason::MovingBase { axis } => write!(
                 f,
                 "external axis {} carries the robot's base, whose position is not modelled",
@@ -343,23 +430,23 @@ impl fmt::Display for OutcomeReason {
             OutcomeReason::CorrectionTooLarge { mm } => {
                 write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)")
             }
-            OutcomeReason::RotationTooLarge { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
+            OutcomeReason::RotationTooLarge { deg } => {
+                write!(f, "correction of the orientation by {deg:.3}° exceeds the bound")
+            }
             OutcomeReason::JointJump { joint, deg, most_deg, on_the_way } => write!(
                 f,
-                "{}the correction would turn joint {} by {deg:.1}°, but at most {most_deg:.1}° is needed away from \
-                 singularities: keep farther from the singular configuration",
+                "{}the correction would turn joint {} by {deg:.1}° (limit {most_deg:.1}°), since the arm is near a singularity: move the \
+                 path away from it",
                 if *on_the_way { "on the way to it " } else { "" },
                 joint + 1
             ),
-            OutcomeReason::PathDeviation { mm } => {
+            OutcomeReason::PathDeviation { mm } if mm.is_finite() => {
                 write!(f, "the path to it deviates from the intended one by {mm:.3} mm")
             }
-            OutcomeReason::CornerDeviation { mm } => {
-                write!(
-                    f,
-                    "the rounded corner before it deviates from the intended one by {mm:.3} mm: round it less (zone, path tolerance)"
-                )
-            }
+            OutcomeReason::CornerDeviation { mm } if mm.is_finite() => write!(
+                f,
+                "the rounded corner before it deviates from the intended one by {mm:.3} mm: round it less (zone, path tolerance)"
+            ),
             OutcomeReason::AmbiguousCentre { mm } => write!(
                 f,
                 "an arc of about half a turn programmed by its radius: the written decimals leave its centre ambiguous by \
@@ -370,10 +457,27 @@ impl fmt::Display for OutcomeReason {
                 "at the programmed speed joint {} exceeds its speed limit by a factor of {ratio:.2}",
                 joint + 1
             ),
-            OutcomeReason::StartOfUnchangedArc { .. }
-            | OutcomeReason::StartOfUnchangedCut { .. }
-            | OutcomeReason::StartOfSingularPath { .. }
-            | OutcomeReason::StartOfLimitedPath { .. } => self.before_one_that_stays(f),
+            OutcomeReason::HalfTurn { line } => write!(
+                f,
+                "on line {line} the tool turns by about 180°: after the correction the controller might turn it the other way round; insert a \
+                 target halfway"
+            ),
+            OutcomeReason::StartOfUnchangedArc { line } => write!(
+                f,
+                "the circular motion of line {line} is not corrected and starts here: from a corrected start it would be a different circle"
+            ),
+            OutcomeReason::StartOfUnchangedCut { line } => write!(
+                f,
+                "the cut at line {line} is not corrected and starts here: correcting its start would tilt its first line"
+            ),
+            OutcomeReason::StartOfSingularPath { line } => write!(
+                f,
+                "the motion of line {line} is not corrected and starts here: from a corrected start it would pass too close to a singularity"
+            ),
+            OutcomeReason::StartOfLimitedPath { line, what } => write!(
+                f,
+                "the motion of line {line} is not corrected and starts here: from a corrected start {what} would exceed its limits on the way"
+            ),
             OutcomeReason::JointNotMeasured { joint, by_deg } => write!(
                 f,
                 "joint {} is {by_deg:.1}° outside the range in which the arm was measured",
@@ -381,17 +485,16 @@ impl fmt::Display for OutcomeReason {
             ),
             OutcomeReason::PartOfCut { line, because } => write!(
                 f,
-                "a cut is corrected as a whole or not at all, and line {line} remains unmodified: {because} (--partial corrects \
-                 the rest)"
+                "a cut is corrected as a whole or not at all, and line {line} is not corrected: {because} (--partial corrects the rest)"
             ),
             OutcomeReason::Step { line, mm } => write!(
                 f,
-                "line {line} of the same cut remains unmodified: the step of {mm:.3} mm between the two exceeds --tolerance"
+                "the step of {mm:.3} mm to line {line} of the same cut, which is not corrected, would exceed --tolerance"
             ),
             OutcomeReason::Risk { chance } => write!(
                 f,
-                "the correction makes this cut worse with a probability of {:.0} %, more than --max-risk allows: the \
-                 measurement does not determine the arm well enough here",
+                "the correction would make this cut worse with a probability of {:.0} %, above --max-risk: the arm was not measured well \
+                 enough here",
                 100.0 * chance
             ),
             OutcomeReason::NotCovered { ratio } => {

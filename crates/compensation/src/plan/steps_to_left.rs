@@ -1,4 +1,4 @@
-//! Steps of the path between motions that are corrected and their neighbours that are left.
+//! Steps of the path between corrected motions and their uncorrected neighbours.
 
 use std::collections::BTreeSet;
 
@@ -9,21 +9,23 @@ use crate::line_list::lines_of;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason, TargetValue};
 use truegrind_programs::rewrite::{Change, NewTarget};
 
-/// Corrected lines and arcs beside lines and arcs that are left, in the order of the file, with the same tool and work object, and those
-/// that start at a joint motion that is left, with any.
+/// Corrected lines and arcs next to uncorrected ones with the same tool and work object, in the order of the file, and those that start at
+/// an uncorrected joint motion, whatever its tool and work object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepsToLeft {
     /// The corrected motions.
     pub motions: Vec<u32>,
-    /// Those of them that start at a joint target that is left.
+    /// Those of them that start at an uncorrected joint target.
     pub from_joint_targets: Vec<u32>,
-    /// The largest of the steps (mm): how far the correction moves the end.
-    pub largest_mm: f64,
+    /// The largest of the steps (mm): how far the correction moves the end. `None` where that is known of none.
+    pub largest_mm: Option<f64>,
+    /// Those of the motions of whose step it is not known.
+    pub of_unknown_size: Vec<u32>,
 }
 
 impl StepsToLeft {
     /// The steps above a tolerance; `None` without any. `outcome` is the status of a motion, its reason, and its deviation before (mm).
-    pub(crate) fn of(
+    pub fn of(
         listing: &Listing,
         changes: &[Change],
         outcome: &dyn Fn(usize) -> (Status, Option<OutcomeReason>, Option<f64>),
@@ -64,16 +66,21 @@ impl StepsToLeft {
         let by_joints =
             |start: &Motion, _| matches!(start.kind, MotionKind::AbsoluteJoint | MotionKind::Joint);
         let is_joint_target = |_: &Motion, reason| reason == Some(OutcomeReason::JointTarget);
-        let mut found =
-            Self { motions: Vec::new(), from_joint_targets: Vec::new(), largest_mm: tolerance_mm };
+        let mut found = Self {
+            motions: Vec::new(),
+            from_joint_targets: Vec::new(),
+            largest_mm: None,
+            of_unknown_size: Vec::new(),
+        };
         for change in changes {
             let motion = &listing.motions[change.motion as usize];
             let (status, _, before_mm) = outcome(change.motion as usize);
-            if !is_path(motion) || !matches!(status, Status::Changed | Status::Flagged) {
+            if !is_path(motion) || !status.is_written() {
                 continue;
             }
-            let moved_mm = moved_mm(motion, change).or(before_mm).unwrap_or(0.0);
-            if moved_mm > tolerance_mm
+            // A step of unknown size may be one above the tolerance.
+            let moved_mm = moved_mm(motion, change).or(before_mm);
+            if moved_mm.is_none_or(|mm| mm > tolerance_mm)
                 && (beside_left_across.contains(&change.motion)
                     || beside_left(change.motion as usize)
                     || starts_left(change.motion, &by_joints))
@@ -82,7 +89,12 @@ impl StepsToLeft {
                 if starts_left(change.motion, &is_joint_target) {
                     found.from_joint_targets.push(change.motion);
                 }
-                found.largest_mm = found.largest_mm.max(moved_mm);
+                match moved_mm {
+                    Some(mm) => {
+                        found.largest_mm = Some(found.largest_mm.map_or(mm, |largest| largest.max(mm)))
+                    }
+                    None => found.of_unknown_size.push(change.motion),
+                }
             }
         }
         (!found.motions.is_empty()).then_some(found)
@@ -90,11 +102,15 @@ impl StepsToLeft {
 
     /// What a report says of them.
     pub fn sentence(&self, listing: &Listing) -> String {
+        let size = match self.largest_mm {
+            Some(mm) => format!("by up to {mm:.2} mm, the size of the correction,"),
+            None => "by an unknown amount".to_owned(),
+        };
+        let lines = lines_of(listing, &self.motions).unwrap_or_default();
+        let unknown = lines_of(listing, &self.of_unknown_size).filter(|_| self.largest_mm.is_some());
+        let unknown = unknown.map(|lines| format!("; by how much at {lines} is unknown")).unwrap_or_default();
         format!(
-            "motions that are left stand beside corrected ones: between them the path has a step of up to {:.2} mm, the size of the \
-             correction ({})",
-            self.largest_mm,
-            lines_of(listing, &self.motions).unwrap_or_default()
+            "the path steps {size} between corrected motions and uncorrected neighbours ({lines}{unknown})"
         ) + &self.joint_targets(listing).unwrap_or_default()
     }
 
@@ -104,8 +120,8 @@ impl StepsToLeft {
         let (start, they) =
             if self.from_joint_targets.len() == 1 { ("starts", "it") } else { ("start", "they") };
         Some(format!(
-            "; {lines} {start} at a joint target that is left: {they} would not follow the intended line from there (--joint-targets corrects \
-             joint targets too)"
+            "; {lines} {start} at an uncorrected joint target, so {they} would leave the intended line (--joint-targets corrects joint \
+             targets too)"
         ))
     }
 }

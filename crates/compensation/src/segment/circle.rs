@@ -7,7 +7,7 @@
 //! Stops: after [`ROUNDS`] increases, or where the arm cannot follow; the circle is then kept.
 
 use crate::arms::Arms;
-use crate::feasibility::singularity::jumps_joint;
+use crate::feasibility::joint_jump::jumps_joint;
 use crate::options::{Emit, Options};
 use crate::segment::condition_schedule::CHORD_MM;
 use crate::segment::curve::{Curve, between};

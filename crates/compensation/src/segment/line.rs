@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use crate::arms::Arms;
 use crate::backlash::play_operator::PlayOperator;
 use crate::condition::arm_conditions::select;
-use crate::feasibility::singularity::jumps_joint;
+use crate::feasibility::joint_jump::jumps_joint;
 use crate::frames::frame_pair::ResolvedFrames;
 use crate::options::{Emit, Options};
 use crate::segment::condition_schedule::{CHORD_MM, ConditionSchedule};

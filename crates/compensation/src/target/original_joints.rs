@@ -361,7 +361,7 @@ fn guess_if_possibly_unmonitored(
 /// Shortest joint motion for which another branch can be nearer (rad): the wrist that is turned over stands half a turn away.
 const OTHER_BRANCH_RAD: f64 = 1.2;
 
-/// Whether another solution is nearer to the start of a joint motion, by the joint that goes farthest, than the one in the branch of the
+/// Whether another solution is nearer to the start of a joint motion (by its largest joint difference) than the one in the branch of the
 /// start, with which the original joints go on. Makers say that the nearest one is taken, and not how near is measured.
 fn is_other_branch_nearer(
     start: &OriginalTarget<'_>,

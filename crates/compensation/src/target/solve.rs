@@ -18,7 +18,7 @@ use crate::condition::arm_conditions::select;
 use crate::configuration::monitored;
 use crate::deviation::Deviation;
 use crate::feasibility::correction_bounds::forbidden;
-use crate::feasibility::singularity::{WrittenTarget, target_fault};
+use crate::feasibility::joint_jump::{WrittenTarget, target_fault};
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Circles, Options, is_rewritable};
 use crate::plan::reason::OutcomeReason;

@@ -3,13 +3,15 @@
 //! Each program's targets are compared in its own tool and work object: a program whose tool, work object or displacement is another one,
 //! or that has motions of its own, reaches the numbers of the original elsewhere, and its figures mean nothing.
 
+use std::collections::HashMap;
+
 use nalgebra::Vector3;
 
 use super::executed_end::ExecutedEnd;
 use crate::line_list::lines_of;
 use crate::segment::curve::Curve;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Frame, Listing, Motion, MotionKind, Role, Tool, WorkObject};
+use truegrind_programs::motion::{Frame, Listing, Motion, MotionKind, Tool, WorkObject};
 
 /// How much farther than its neighbours an inserted target may be off the intended path (mm): a program may be verified with another
 /// model than the one that corrected it.
@@ -31,14 +33,19 @@ pub(super) struct Compared<'a> {
 
 /// What differs, each with the motions of the rewritten program where it does.
 #[derive(Default)]
-struct Found(Vec<(String, Vec<u32>)>);
+struct Found {
+    entries: Vec<(String, Vec<u32>)>,
+    /// Where a sentence stands: a size in it makes nearly each its own.
+    index_of: HashMap<String, usize>,
+}
 
 impl Found {
     fn push(&mut self, motion: usize, what: String) {
-        match self.0.iter_mut().find(|(known, _)| *known == what) {
-            Some((_, motions)) => motions.push(motion as u32),
-            None => self.0.push((what, vec![motion as u32])),
-        }
+        let index = *self.index_of.entry(what).or_insert_with_key(|what| {
+            self.entries.push((what.clone(), Vec::new()));
+            self.entries.len() - 1
+        });
+        self.entries[index].1.push(motion as u32);
     }
 }
 
@@ -49,12 +56,12 @@ impl Compared<'_> {
         let mut sentences = Vec::new();
         if rewritten.motions.len() < original.motions.len() {
             let [has, of] = [rewritten, original].map(|listing| listing.motions.len());
-            sentences.push(format!("it has {has} motions, and the original {of}: motions are lost"));
+            sentences.push(format!("{has} motions, but the original has {of}: motions were removed"));
             return sentences;
         }
         if rewritten.opaque.len() != original.opaque.len() {
             let [has, of] = [rewritten, original].map(|listing| listing.opaque.len());
-            sentences.push(format!("{has} regions of it cannot be read, and {of} of the original"));
+            sentences.push(format!("{has} unreadable regions; the original has {of}"));
         }
         let mut found = Found::default();
         for (index, partner) in self.partners.iter().enumerate() {
@@ -63,7 +70,7 @@ impl Compared<'_> {
             }
         }
         self.find_added(&mut found);
-        sentences.extend(found.0.into_iter().map(|(what, motions)| {
+        sentences.extend(found.entries.into_iter().map(|(what, motions)| {
             let lines = lines_of(rewritten, &motions).unwrap_or_default();
             format!("{lines}: {what}")
         }));
@@ -74,42 +81,38 @@ impl Compared<'_> {
         let [original, rewritten] = [self.original, self.rewritten];
         let [was, is] = [&original.motions[index], &rewritten.motions[partner]];
         if !is_possible_form(was, is) {
-            found.push(partner, format!("{}, and {} in the original", is.instruction, was.instruction));
+            found.push(partner, format!("{} here, {} in the original", is.instruction, was.instruction));
         }
         if !stands_alike([original, rewritten], [was, is]) {
-            let what = "the motion stands in another routine, branch or loop than in the original";
+            let what = "the motion is in another routine, branch or loop than in the original";
             found.push(partner, what.to_owned());
         }
         let [had, has] = [original.tool(was), rewritten.tool(is)];
         if !is_same_tool(had, has) {
-            found.push(partner, format!("tool {}, and in the original {}", tool_words(has), tool_words(had)));
+            found
+                .push(partner, format!("tool {} here, {} in the original", tool_words(has), tool_words(had)));
         }
         let [had, has] = [original.work_object(was), rewritten.work_object(is)];
         let displacement = |object: Option<&WorkObject>| object.and_then(|object| object.displacement);
         if displacement(had) != displacement(has) || was.modal.displacement != is.modal.displacement {
-            found.push(partner, "another program displacement than in the original".to_owned());
+            found.push(partner, "the program displacement differs from the original".to_owned());
         } else if !is_same_object(had, has) {
             let [has, had] = [has, had].map(object_words);
-            found.push(partner, format!("work object {has}, and in the original {had}"));
+            found.push(partner, format!("work object {has} here, {had} in the original"));
         }
         if self.before[index].is_some() && self.after[partner].is_none() {
-            let what = "the program text does not tell where the motion leads or the arm does not reach it, other than in the original";
+            let what = "the target is unknown or out of reach here, but not in the original";
             found.push(partner, what.to_owned());
         }
         if let Some(mm) = self.circle_point_moved_mm(index, partner) {
-            found.push(
-                partner,
-                format!("the circle point is moved by {mm:.1} mm, unlike the end of the motion"),
-            );
+            found
+                .push(partner, format!("the circle point moved by {mm:.1} mm, unlike the end of the motion"));
         }
     }
 
-    /// How far a circle point is moved (mm), where it is not as the end of its motion is.
+    /// Displacement of the circle point (mm), if it differs from that of the end.
     fn circle_point_moved_mm(&self, index: usize, partner: usize) -> Option<f64> {
-        let via = |motion: &Motion| {
-            let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
-            Some(via.value.ok()?.cartesian()?.pose().translation.vector)
-        };
+        let via = |motion: &Motion| Some(motion.via()?.value.ok()?.cartesian()?.pose().translation.vector);
         let [was, is] = [via(&self.original.motions[index])?, via(&self.rewritten.motions[partner])?];
         let end = correction(self.before[index]?, self.after[partner]?);
         let moved = is - was;
@@ -130,11 +133,10 @@ impl Compared<'_> {
         for added in (0..self.after.len()).filter(|motion| !is_partner[*motion]) {
             match owner[added].and_then(|index| self.off_path_mm(added, index)) {
                 Some((mm, bound_mm)) if mm <= bound_mm => {}
-                Some((mm, _)) => found.push(
-                    added,
-                    format!("an added motion, whose end is {mm:.1} mm off the path of the original"),
-                ),
-                None => found.push(added, "an added motion, on no path of the original".to_owned()),
+                Some((mm, _)) => {
+                    found.push(added, format!("an added motion that ends {mm:.1} mm off the original path"))
+                }
+                None => found.push(added, "an added motion that is on no path of the original".to_owned()),
             }
         }
     }
@@ -178,8 +180,7 @@ fn way(motion: &Motion, from: Pose, to: Pose) -> Option<Curve> {
     if motion.kind == MotionKind::Linear {
         return Some(Curve::line(from, to));
     }
-    let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
-    Curve::round(from, &via.value.ok()?.cartesian()?.pose(), to, motion)
+    Curve::round(from, &motion.via()?.value.ok()?.cartesian()?.pose(), to, motion)
 }
 
 /// Distance of a pose from a way between its ends (mm).
@@ -199,7 +200,7 @@ fn distance_mm(way: &Curve, pose: &Pose) -> f64 {
     (way.at(share).translation.vector - at).norm()
 }
 
-/// Whether a correction can write a motion so: it writes joints for poses, and straight pieces for circles.
+/// Whether a correction can turn one form into the other: it writes joints for poses, and straight segments for circles.
 fn is_possible_form(was: &Motion, is: &Motion) -> bool {
     let kind = match was.kind {
         MotionKind::Linear | MotionKind::Joint => [was.kind, was.kind, MotionKind::AbsoluteJoint],
@@ -209,7 +210,7 @@ fn is_possible_form(was: &Motion, is: &Motion) -> bool {
     kind.contains(&is.kind) && was.rapid == is.rapid
 }
 
-/// Whether two motions stand in the same routine, and both in a branch or loop or not.
+/// Whether both are in the same routine, and agree on being conditional or in a loop.
 fn stands_alike([original, rewritten]: [&Listing; 2], [was, is]: [&Motion; 2]) -> bool {
     let routine = |listing: &Listing, motion: &Motion| {
         motion.routine.map(|routine| listing.routines[routine as usize].name.to_lowercase())
@@ -241,7 +242,7 @@ fn tool_words(tool: Option<&Tool>) -> String {
             let at = if value.robhold { "" } else { ", stationary" };
             format!("{} at {}, {} kg{at}", tool.name, frame_words(&value.frame), value.mass_kg)
         }
-        Err(_) => format!("{}, whose value is not known", tool.name),
+        Err(_) => format!("{}, whose value is unknown", tool.name),
     }
 }
 
@@ -254,7 +255,7 @@ fn object_words(object: Option<&WorkObject>) -> String {
             frame_words(&value.user_frame),
             frame_words(&value.object_frame)
         ),
-        Err(_) => format!("{}, whose value is not known", object.name),
+        Err(_) => format!("{}, whose value is unknown", object.name),
     }
 }
 

@@ -12,12 +12,14 @@ use truegrind_compensation::cut::Cuts;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::options::{Emit, Options};
 use truegrind_compensation::plan::reason::OutcomeReason;
+use truegrind_compensation::plan::steps_to_left::StepsToLeft;
 use truegrind_programs::motion::Mark;
 use truegrind_programs::nc;
 use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::rapid::Task;
 use truegrind_programs::reading::Program;
+use truegrind_programs::rewrite::{Change, NewTarget};
 
 use super::{estimated, perturbed};
 
@@ -71,7 +73,7 @@ fn a_target_that_cannot_be_reached_keeps_its_cut_and_no_other() {
     let (done, bytes) = done(&module(&body), Cuts::Whole, 0.05);
     assert_eq!(statuses(&done), [Refused, Refused, Refused, Refused, Changed, Changed, Changed]);
     let because = |index: usize| done.plan.outcomes[index].reason().unwrap().to_string();
-    assert!(because(0).contains("line 6 remains unmodified: out of reach"), "{}", because(0));
+    assert!(because(0).contains("line 6 is not corrected: target is out of reach"), "{}", because(0));
     assert!(because(2).contains("reach"), "{}", because(2));
     let text = String::from_utf8(bytes).unwrap();
     for x in ["380", "390", "900", "400"] {
@@ -150,7 +152,7 @@ fn steps_beside_what_is_left_are_counted() {
     assert_eq!(statuses(&done), [Changed, Changed, Left, Changed, Changed]);
     let steps = done.plan.steps.unwrap();
     assert_eq!(steps.motions, [1, 3]);
-    assert!(steps.largest_mm > 0.05 && steps.largest_mm < 10.0, "{steps:?}");
+    assert!(steps.largest_mm.is_some_and(|mm| mm > 0.05 && mm < 10.0), "{steps:?}");
     // What an instruction of a module that is not given does there is unknown.
     let elsewhere = "grind [[387,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n".to_owned();
     let body = [line(380.0, "fine"), line(385.0, "fine"), elsewhere, line(390.0, "fine")].concat();
@@ -187,6 +189,32 @@ fn the_approach_to_a_cut_that_is_left_stays_too() {
     );
 }
 
+/// A line that is written as joints, and of which no deviation is known, counted as one without a step.
+#[test]
+fn a_step_of_unknown_size_is_a_step() {
+    let source = module(&[line(380.0, "fine"), line(385.0, "fine"), line(390.0, "fine")].concat());
+    let listing = Task::read(&[("p.mod", source.as_bytes())]).listing;
+    let joints = NewTarget::Joint { robot_deg: [0.0; 6] };
+    let change = |motion: u32| Change { motion, targets: [joints].into(), before: Vec::new() };
+    let of = |before_mm: [Option<f64>; 3]| {
+        let outcome = |motion: usize| match motion {
+            1 => (Left, Some(OutcomeReason::JointTarget), before_mm[1]),
+            _ => (Changed, None, before_mm[motion]),
+        };
+        StepsToLeft::of(&listing, &[change(0), change(2)], &outcome, 0.05)
+    };
+    assert_eq!(of([Some(0.01); 3]), None);
+    let some = of([Some(0.3), None, None]).unwrap();
+    assert_eq!(
+        (some.motions.as_slice(), some.of_unknown_size.as_slice()),
+        ([0, 2].as_slice(), [2].as_slice())
+    );
+    let text = some.sentence(&listing);
+    assert!(text.contains("up to 0.30 mm") && text.contains("by how much at line 6 is unknown"), "{text}");
+    let none = of([None; 3]).unwrap();
+    assert!(none.sentence(&listing).contains("by an unknown amount"), "{none:?}");
+}
+
 /// A line from a joint target that is left is a wedge as high as the correction. It was "ok", since the ends of the line are right.
 #[test]
 fn lines_from_joint_targets_that_are_left_are_counted() {
@@ -206,7 +234,10 @@ fn lines_from_joint_targets_that_are_left_are_counted() {
     let begins = [joint("tool0"), a.clone(), b.clone()];
     let (found, text) = steps(&begins, false);
     assert_eq!(found, Some([vec![1], vec![1]]));
-    assert!(text.contains("line 5 starts at a joint target") && text.contains("--joint-targets"), "{text}");
+    assert!(
+        text.contains("line 5 starts at an uncorrected joint target") && text.contains("--joint-targets"),
+        "{text}"
+    );
     assert_eq!(steps(&begins, true).0, None);
     // In the middle, with another tool.
     assert_eq!(steps(&[a.clone(), joint("long"), b.clone(), c.clone()], false).0, Some([vec![2], vec![2]]));

@@ -92,9 +92,9 @@ fn edits(text: &str) -> Vec<(String, &'static str, usize)> {
     let beyond = format!("    MoveL [[60,10,20],{PLACE},v100,z1,tS\\WObj:=wB;");
     // The main routine is repeated, so a displacement may hold in its first motion too.
     vec![
-        (insert(first + 2, &off), "an added motion, whose end is", first + 3),
-        (insert(last + 1, &beyond), "an added motion, on no path", last + 2),
-        (insert(first, "    PDispSet [[0,0,5],[1,0,0,0]];"), "another program displacement", 5),
+        (insert(first + 2, &off), "an added motion that ends", first + 3),
+        (insert(last + 1, &beyond), "an added motion that is on no path", last + 2),
+        (insert(first, "    PDispSet [[0,0,5],[1,0,0,0]];"), "the program displacement differs", 5),
         (
             text.replace("[[0,0,50],[1,0,0,0]],[1,", "[[0,0,52],[1,0,0,0]],[1,"),
             "tool tS at [0.0, 0.0, 52.0] mm",
@@ -102,7 +102,7 @@ fn edits(text: &str) -> Vec<(String, &'static str, usize)> {
         ),
         (text.replace("[[300,10,200]", "[[300,10,205]"), "work object wB", 5),
         (replace(first + 2, "tS", "tool0"), "tool tool0", first + 3),
-        (replace(first + 2, "MoveL", "MoveJ"), "MoveJ, and MoveL in the original", first + 3),
+        (replace(first + 2, "MoveL", "MoveJ"), "MoveJ here, MoveL in the original", first + 3),
     ]
 }
 
@@ -130,7 +130,7 @@ fn what_else_differs_is_told_by_line() {
     assert!(!judged(&program(), &unknown).differences.is_empty());
     let lost: Vec<&str> = text.lines().enumerate().filter(|(k, _)| *k != 7).map(|(_, line)| line).collect();
     let found = judged(&program(), &lost.join("\n")).differences;
-    assert!(found.iter().any(|sentence| sentence.contains("motions are lost")), "{found:?}");
+    assert!(found.iter().any(|sentence| sentence.contains("motions were removed")), "{found:?}");
 }
 
 /// The circle point decides where the circle lies, and no motion ends there.
@@ -142,5 +142,5 @@ fn a_circle_point_that_moves_otherwise_than_its_motion_is_told() {
     let moved: f64 = number.parse::<f64>().unwrap() + 8.0;
     let edited = text.replace(line, &line.replacen(number, &moved.to_string(), 1));
     let found = judged(&program(), &edited).differences;
-    assert!(found.len() == 1 && found[0].contains("the circle point is moved by"), "{found:?}");
+    assert!(found.len() == 1 && found[0].contains("the circle point moved by"), "{found:?}");
 }

@@ -39,7 +39,7 @@ fn what_is_in_doubt_changes_no_program_and_is_in_its_sigma() {
     assert!(sigma(&after.0) > 1.2 * sigma(&before.0), "{} {}", sigma(&after.0), sigma(&before.0));
     let said = |word: &str| after.0.notes.iter().any(|note| note.contains(word));
     assert!(
-        said("doubtful") && said("joint-compliance of joint 2") && !said("payload"),
+        said("not certain") && said("joint-compliance of joint 2") && !said("payload"),
         "{:?}",
         after.0.notes
     );

@@ -45,3 +45,9 @@ fn a_line_that_might_turn_the_tool_the_other_way_is_refused_with_both_ends() {
         assert_eq!(reasons(turn_deg), [None; 3], "{turn_deg}");
     }
 }
+
+#[test]
+fn the_reason_names_the_line_and_the_remedy() {
+    let said = OutcomeReason::HalfTurn { line: 6 }.to_string();
+    assert!(said.contains("line 6") && said.contains("target"), "{said}");
+}

@@ -334,7 +334,7 @@ fn a_line_from_two_known_places_is_judged_by_the_worse_path() {
         matches!(outcome.reason(), Some(OutcomeReason::PathDeviation { mm }) if (mm - far_mm).abs() < 1e-9);
     assert!(outcome.status == Status::Flagged && judged && outcome.inserted == 0, "{outcome:?}");
     assert!(
-        notes.contains("1 line or arc may start at several places")
+        notes.contains("1 line or arc may start at more than one place")
             && !notes.contains("unknown or not corrected")
     );
     // One of the places is not known.

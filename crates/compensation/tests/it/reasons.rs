@@ -64,6 +64,8 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::PartOfCut { .. } => "part of cut",
         OutcomeReason::Step { .. } => "step",
         OutcomeReason::AirMoveAlone => "air-move-alone",
+        // No program is known that needs so many rounds.
+        OutcomeReason::NoConsistentPlan => "no consistent plan",
         // tests/it/placement.rs.
         OutcomeReason::Risk { .. } => "risk",
         OutcomeReason::NotCovered { .. } => "not covered",
@@ -438,7 +440,7 @@ fn calls_of_routines_in_no_file_are_noted_with_what_is_assumed_of_them() {
     let plan = planned(source.as_bytes(), &known(), &Cell::default(), &fine());
     let notes = plan.notes.join("\n");
     assert!(
-        notes.contains("in none of the files are called: SetShift (lines 4, 6); they are assumed"),
+        notes.contains("routines missing from the files are called: SetShift (lines 4, 6). They are assumed"),
         "{notes}"
     );
     assert!(!notes.contains("SetDO"), "{notes}");

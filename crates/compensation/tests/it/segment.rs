@@ -394,9 +394,9 @@ fn a_configuration_that_the_text_does_not_tell_is_said_to_be_taken() {
         ))
     };
     let (planned, _) = rewrite(&body("ConfJ\\Off"), &known(&actual), &Options::default());
-    let note = planned.notes.iter().find(|note| note.contains("configuration next to where")).unwrap();
+    let note = planned.notes.iter().find(|note| note.contains("configuration not monitored")).unwrap();
     // Only the first: the second goes from there.
-    assert!(note.starts_with("1 motion goes, unchecked,") && note.ends_with("(line 4)"), "{note}");
+    assert!(note.starts_with("1 motion goes from an unknown start") && note.ends_with("(line 4)"), "{note}");
     let (planned, _) = rewrite(&body("ConfJ\\On"), &known(&actual), &Options::default());
-    assert!(!planned.notes.iter().any(|note| note.contains("configuration next to where")));
+    assert!(!planned.notes.iter().any(|note| note.contains("configuration not monitored")));
 }

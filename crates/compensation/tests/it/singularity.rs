@@ -176,7 +176,7 @@ pub(super) fn ends(program: &[u8]) -> Vec<(MotionKind, Pose, [i32; 4])> {
 }
 
 pub(super) fn corrected(outcome: &MotionOutcome) -> bool {
-    matches!(outcome.status, Status::Changed | Status::Flagged)
+    outcome.status.is_written()
 }
 
 /// The most that a correction may turn a joint (rad), as the option says.

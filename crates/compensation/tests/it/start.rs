@@ -13,7 +13,7 @@ use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
-use truegrind_programs::motion::{Frame, Listing};
+use truegrind_programs::motion::{Frame, Listing, NcFacts};
 use truegrind_programs::nc::Task;
 use truegrind_programs::nc::setup::Setup;
 
@@ -86,7 +86,7 @@ fn without_a_word_the_wrist_is_in_front_and_not_turned_over_whichever_way_the_ma
             assert!((q[0] - first * side).abs() < 5.0, "{robot} {q:?}");
             assert!(q[3].abs() < 20.0 && fifth * q[4] > 10.0, "{robot} {q:?}");
         }
-        let note = plan.notes.iter().find(|note| note.contains("no NC word states")).unwrap();
+        let note = plan.notes.iter().find(|note| note.contains("NC states no configuration")).unwrap();
         assert!(note.contains("start_deg") && note.contains("(line 6)"), "{note}");
     }
 }
@@ -107,7 +107,11 @@ fn the_cell_file_says_where_the_arm_starts() {
         let plan = planned(&arm, &listing, &started(near));
         let q = joints_deg(&plan)[0];
         assert!((0..6).all(|j| (q[j] - over[j]).abs() < 1e-6), "{robot} {q:?} {over:?}");
-        assert!(!plan.notes.iter().any(|note| note.contains("no NC word states")), "{:?}", plan.notes);
+        assert!(
+            !plan.notes.iter().any(|note| note.contains("NC states no configuration")),
+            "{:?}",
+            plan.notes
+        );
         // Another configuration, another correction: a twist of the forearm moves the tool the other way.
         let corrected = |cell: &Cell| planned(&arm, &listing, cell).points[0].joints_after.unwrap();
         let [a, b] = [corrected(&Cell::default()), corrected(&started(near))];
@@ -124,16 +128,19 @@ fn a_comment_says_where_the_arm_starts() {
     over[3] += 180.0;
     over[4] *= -1.0;
     over[5] += 180.0;
-    let said = Listing { start_deg: Some(over), ..usual.clone() };
+    let said = Listing { nc: NcFacts { start_deg: Some(over), ..usual.nc.clone() }, ..usual.clone() };
     let plan = planned(&arm, &said, &Cell::default());
     let q = joints_deg(&plan)[0];
     assert!((0..6).all(|j| (q[j] - over[j]).abs() < 1e-6), "{q:?} {over:?}");
-    assert!(!plan.notes.iter().any(|note| note.contains("no NC word states")), "{:?}", plan.notes);
+    assert!(!plan.notes.iter().any(|note| note.contains("NC states no configuration")), "{:?}", plan.notes);
     let begins = |plan: &Plan| joints_deg(plan)[0];
     let with_both = planned(&arm, &said, &started([0.0, 0.0, 90.0, 0.0, 90.0, 0.0]));
     let [a, b] = [begins(&with_both), begins(&planned(&arm, &usual, &Cell::default()))];
     assert!((0..6).all(|j| (a[j] - b[j]).abs() < 1e-6), "{a:?} {b:?}");
-    let far = Listing { start_deg: Some([0.0, 0.0, 400.0, 0.0, 90.0, 0.0]), ..usual };
+    let far = Listing {
+        nc: NcFacts { start_deg: Some([0.0, 0.0, 400.0, 0.0, 90.0, 0.0]), ..usual.nc.clone() },
+        ..usual
+    };
     let found = contradictions(&far, &Cell::default(), &arm.nominal);
     assert!(
         found.len() == 1 && found[0].starts_with("`truegrind start` of the program: joint 3"),

@@ -479,10 +479,10 @@ fn taught_without_points_is_taken_as_it_stands_and_said() {
     let source = module(&scene.data(), &moves("tGrind", "wPart", &scene.turn()));
     let (plan, _) = planned(&source, &stated(bare), &scene.actual);
     all_changed(&plan);
-    assert_eq!(plan.notes.iter().filter(|note| note.contains("teaching points are not given")).count(), 2);
+    assert_eq!(plan.notes.iter().filter(|note| note.contains("teaching points are missing")).count(), 2);
     let swapped = source.replace("tGrind:=[TRUE", "tGrind:=[FALSE").replace("wPart:=[FALSE", "wPart:=[TRUE");
     let (plan, _) = planned(&swapped, &stated(bare), &scene.actual);
-    assert_eq!(plan.notes.iter().filter(|note| note.contains("teaching points are not given")).count(), 2);
+    assert_eq!(plan.notes.iter().filter(|note| note.contains("teaching points are missing")).count(), 2);
 }
 
 /// The class: a linear system that is solved by a decomposition which is not exact where singular values coincide, as those of

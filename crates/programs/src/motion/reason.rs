@@ -30,7 +30,7 @@ macro_rules! reasons {
 }
 
 reasons! {
-    /// Why a value is unknown, or a motion stays unmodified.
+    /// Why a value is unknown, or a motion is not corrected.
     Reason {
         Parameter => "a parameter of the routine: its value comes from the caller",
         Undeclared => "declared in none of the given files",
@@ -74,11 +74,11 @@ reasons! {
         SideEffect => "the target's expression calls a function with side effects and must not be replaced",
         NumberRange => "a number exceeds the range of the controller",
         BeforeDisplacement => "a displacement (PDispOn) is relative to the end of this motion",
-        BeforeOrigin => "an unmodified block uses an origin set at the end of this motion (G92, G10 L20, PRESETON)",
-        BeforeIncrement => "an unmodified block is relative to the end of this motion (increment, or a position read by the program)",
-        BeforeOmitted => "an unmodified block states not every axis: in the others it ends where this motion ends",
+        BeforeOrigin => "an uncorrected block uses an origin set at the end of this motion (G92, G10 L20, PRESETON)",
+        BeforeIncrement => "an uncorrected block is relative to the end of this motion (increment, or a position read by the program)",
+        BeforeOmitted => "a later uncorrected block omits an axis and takes it over from the end of this motion",
         PositionUnknown => "the position of an axis is unknown: not programmed since the start, a reference return, or a change of frame or tool",
-        OrientationUnknown => "the tool orientation is unknown: no A, B, C and no tool vector stand before this block since the start, a call or a change of frame, or one that cannot be computed follows them; state all three again",
+        OrientationUnknown => "the tool orientation is unknown: no A, B, C or tool vector with known values since the start, a call or a change of frame; state all three again",
         UnknownConvention => "the convention of A, B and C is unknown: the robot file does not name one",
         UnknownVariable => "a variable known only at run time",
         AmbiguousNumber => "a number without decimal point: mm or increments, depending on a parameter of the control",
@@ -88,7 +88,7 @@ reasons! {
         NoTcpMode => "no tool centre point control (G43.4, TRAORI, M128): X Y Z are not the tool tip",
         Transformed => "coordinates are rotated, scaled, mirrored, polar or in a tilted plane",
         RadiusCompensation => "tool radius compensation is active (G41, G42)",
-        TurnAlone => "turns the tool alone: its feed is in degrees per minute, and X, Y, Z beside it would make it mm per minute",
+        TurnAlone => "turns the tool only: its feed is in °/min, and adding X, Y, Z would make it mm/min",
         AlignedToNormal => "the control aligns the tool with the surface normal (LN without a tool vector under M128)",
         MachineCoordinates => "in machine coordinates (G53, SUPA, M91)",
         Cycle => "a canned cycle: its motions are not in the program",
@@ -101,8 +101,8 @@ reasons! {
         Unreadable => "part of the block could not be read",
         UnknownWord => "an unknown word in this or an earlier block may have changed the modal state",
         LineTooLong => "its line, or a later one that restates changed words, would exceed the line length of the control (512 characters on an 840D, 253 on LinuxCNC)",
-        BeforeUnmodifiedArc => "an unmodified arc starts at the end of this motion",
-        BeforeUnmodifiedPath => "an unmodified path starts at the end of this motion, or continues in its direction",
+        BeforeUnmodifiedArc => "an uncorrected arc starts at the end of this motion",
+        BeforeUnmodifiedPath => "an uncorrected path starts at the end of this motion, or continues in its direction",
     }
 }
 

@@ -8,7 +8,7 @@ use super::modal_group::{ALL_GROUPS, GroupTable, ModalGroup};
 use super::orientation::{Angles, spun};
 use crate::dataflow::Lattice;
 use crate::motion::{Frame, Reason};
-use crate::shared::Map;
+use crate::persistent_map::Map;
 use truegrind_math::se3::Pose;
 
 /// The motion group (group 01).

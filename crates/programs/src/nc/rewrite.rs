@@ -596,7 +596,7 @@ fn keeps_endpoint(reason: Reason) -> bool {
 }
 
 fn via_of(motion: &Motion) -> Option<[f64; 3]> {
-    let target = motion.targets.iter().find(|target| target.role == Role::Via)?;
+    let target = motion.via()?;
     match target.value {
         Ok(TargetValue::Cartesian(target)) => Some(target.position_mm),
         _ => None,

@@ -128,7 +128,7 @@ impl<'s> Task<'s> {
             let mut motions = task.listing.motions.iter().filter(|motion| motion.place.file as usize == file);
             motions.find(|motion| motion.reason().is_none()).map(|motion| motion.place)
         };
-        task.listing.open_controls = open.filter_map(first).collect();
+        task.listing.nc.open_controls = open.filter_map(first).collect();
         task
     }
 }
@@ -216,7 +216,7 @@ impl Transfer for Interpreter<'_, '_> {
         let mut block = self.block.take().unwrap_or_default();
         self.collect_words(node, &mut block);
         self.has_nc_blocks |=
-            !block.opaque && (!block.g.is_empty() || !block.m.is_empty() || block.has_motion_words());
+            !block.flags.opaque && (!block.g.is_empty() || !block.m.is_empty() || block.has_motion_words());
         self.in_skippable_block = nesting.guarded;
         self.interpret(&block);
         self.block = Some(block);
@@ -332,7 +332,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         &Lengths([motions, speeds, zones, tools, objects, events, contexts, points]): &Lengths,
     ) {
         self.listing.motions.truncate(motions);
-        self.listing.external_calls.retain(|call| (*call as usize) < motions);
+        self.listing.nc.external_calls.retain(|call| (*call as usize) < motions);
         self.listing.speeds.truncate(speeds);
         self.listing.zones.truncate(zones);
         self.listing.tools.truncate(tools);
@@ -365,7 +365,7 @@ impl<'t, 's> Interpreter<'t, 's> {
                 Ok(Some(Statement::Tool(stated))) => tools.push((token, stated)),
                 Ok(Some(Statement::Frame(stated))) => frames.push((token, stated)),
                 Ok(Some(Statement::Start(stated))) => {
-                    let first = *self.listing.start_deg.get_or_insert(stated);
+                    let first = *self.listing.nc.start_deg.get_or_insert(stated);
                     if first != stated {
                         let expected = format!("{first:?}, as stated before: the arm starts once");
                         self.list_unusable_comment(token);
@@ -395,7 +395,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             self.setup.tools.iter().cloned().chain(used).map(|one| tool(&one)).collect();
         self.listing.declared_tools.extend(declared);
         let labels = tools.into_iter().chain(frames).map(|(_, stated)| (stated.number, stated.name));
-        self.listing.labels.extend(labels);
+        self.listing.nc.labels.extend(labels);
         // The setup overrides comments.
         let beside = |list: &[(String, Frame)]| -> Vec<(String, Frame)> {
             list.iter().map(|(name, frame)| (setup::plain(name), *frame)).collect()
@@ -463,7 +463,7 @@ impl<'t, 's> Interpreter<'t, 's> {
 
     /// The transfer function of a block.
     fn transfer_words(&mut self, block: &Block<'s>) {
-        if let Some(on) = block.radius_compensation {
+        if let Some(on) = block.flags.radius_compensation {
             self.set_group(ModalGroup::RadiusCompensation, u64::from(on));
         }
         if self.dialect == Dialect::Heidenhain && self.heidenhain(block) {
@@ -491,14 +491,14 @@ impl<'t, 's> Interpreter<'t, 's> {
             self.end_of_block(block);
             return;
         }
-        if block.opaque && block.opaque_may_set {
+        if block.flags.opaque && block.flags.opaque_may_set {
             self.list_unknown_word(block, "?", Reason::Unreadable);
             self.end_of_block(block);
             return;
         }
         self.m_words(block);
         self.tool_words(block);
-        let machine = block.machine_coordinates
+        let machine = block.flags.machine_coordinates
             || block.g.contains(&530)
             || self.dialect == Dialect::Siemens && block.g.contains(&1530)
             || self.dialect == Dialect::Heidenhain && block.m.iter().any(|m| matches!(m, 91 | 92));

@@ -26,7 +26,7 @@ use super::syntax::{Data, RapidTree, Syntax, arguments, expressions, parts, text
 use super::token::{Token, fold, folded, same_name};
 use super::value::{Value, built_in};
 use crate::motion::Reason;
-use crate::shared::Map;
+use crate::persistent_map::Map;
 use crate::tree::Child;
 
 /// Known values of written data, by symbol (constant propagation).

@@ -17,7 +17,7 @@ use super::print::{self, Fresh};
 use super::task::Task;
 use super::token::{Token, folded, keyword, same_name};
 use crate::edit::{EditError, Edits};
-use crate::motion::{Motion, MotionKind, Offset, Origin, Reason, Role, Span, TargetValue};
+use crate::motion::{Motion, MotionKind, Offset, Origin, Reason, Span, TargetValue};
 use crate::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
 
 /// Changes that one thread processes at a time.
@@ -549,7 +549,7 @@ fn written_as(instruction: &'static Instruction, change: &Change) -> Option<&'st
 
 /// The bytes of a circle point, and those of the comma after it with the blanks before the next argument.
 fn circle_point(source: &[u8], motion: &Motion) -> Option<[std::ops::Range<usize>; 2]> {
-    let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
+    let via = motion.via()?;
     let mut argument = via.argument.range();
     // `CirPoint := p20` is deleted with its name.
     if let Some(before) = source[..argument.start].trim_ascii_end().strip_suffix(b":=") {

@@ -596,9 +596,9 @@ fn a_comment_states_the_start_once() {
         "(truegrind start [0,10.5,-5,0,85,180])\n(truegrind start [0,10.5,-5.0,0,85,180])\n",
     ] {
         let listing = read(comments);
-        assert_eq!((listing.start_deg, &listing.invalid_statements[..]), (stated, &[][..]), "{comments}");
+        assert_eq!((listing.nc.start_deg, &listing.invalid_statements[..]), (stated, &[][..]), "{comments}");
     }
-    assert_eq!(read("(start [0,0,0,0,0,0])\n").start_deg, None);
+    assert_eq!(read("(start [0,0,0,0,0,0])\n").nc.start_deg, None);
     for (comment, expected) in [
         ("(truegrind start [0,10.5,-5,0,85])", "in degrees"),
         ("(truegrind start [0,10.5,-5,0,85,nan])", "in degrees"),
@@ -625,8 +625,8 @@ fn a_comment_states_the_control() {
         (task.dialects[0], task.listing)
     };
     let (dialect, listing) = read("p.nc", "", "");
-    assert_eq!((dialect, listing.open_controls.len()), (Dialect::Iso, 1));
-    assert_eq!(listing.open_controls[0].line, 8);
+    assert_eq!((dialect, listing.nc.open_controls.len()), (Dialect::Iso, 1));
+    assert_eq!(listing.nc.open_controls[0].line, 8);
     for (word, expected, reason) in [
         ("fanuc", Dialect::Fanuc, Some(Reason::NoTcpMode)),
         ("LinuxCNC", Dialect::LinuxCnc, None),
@@ -634,7 +634,7 @@ fn a_comment_states_the_control() {
     ] {
         let (dialect, listing) = read("p.nc", &format!("(truegrind control {word})\n"), "");
         assert_eq!((dialect, listing.motions[0].reason()), (expected, reason), "{word}");
-        assert!(listing.open_controls.is_empty() && listing.invalid_statements.is_empty(), "{listing:?}");
+        assert!(listing.nc.open_controls.is_empty() && listing.invalid_statements.is_empty(), "{listing:?}");
     }
     // Words that no LinuxCNC has, and a program number behind a block number.
     for code in ["N1 O0101\n", "G54.1 P2\n", "G187 P1\n"] {
@@ -664,10 +664,10 @@ fn further_axes_are_listed_with_their_first_block() {
         (Dialect::LinuxCnc, "G1 X9 V1", 'V'),
     ] {
         let listing = listing_of(&format!("G1 X1 Y2 Z3\n{block}\n"), dialect);
-        assert_eq!(listing.other_axes.keys().copied().collect::<Vec<_>>(), [letter], "{block}");
+        assert_eq!(listing.nc.other_axes.keys().copied().collect::<Vec<_>>(), [letter], "{block}");
     }
     // On a Fanuc they are increments of X, Y and Z, which are refused.
-    assert!(listing_of("G1 X1 U2\n", Dialect::Fanuc).other_axes.is_empty());
+    assert!(listing_of("G1 X1 U2\n", Dialect::Fanuc).nc.other_axes.is_empty());
 }
 
 #[test]

@@ -146,13 +146,25 @@ fn read(name: &str, text: &str) -> Duration {
 fn no_shape_takes_quadratic_time() {
     const SHORT: usize = 1 << 14;
     for (name, shape) in SHAPES_OF_NC.iter().chain(SHAPES_OF_RAPID) {
-        let (short, long) = (shape(SHORT), shape(4 * SHORT));
-        let best = |text: &str| (0..3).map(|_| read(name, text)).min().unwrap();
-        let (short, long) = (best(&short), best(&long));
-        // Quadratic time would be sixteen times; short times are noise.
-        let square = long > Duration::from_millis(150) && long > short * 11;
-        assert!(!square, "{name}: {short:?} and {long:?} for four times the text");
+        assert_not_quadratic(name, [shape(SHORT), shape(4 * SHORT)]);
     }
+}
+
+fn assert_not_quadratic(name: &str, [short, long]: [String; 2]) {
+    let best = |text: &str| (0..3).map(|_| read(name, text)).min().unwrap();
+    let (short, long) = (best(&short), best(&long));
+    // Quadratic time would be sixteen times; short times are noise.
+    let square = long > Duration::from_millis(150) && long > short * 11;
+    assert!(!square, "{name}: {short:?} and {long:?} for four times the text");
+}
+
+/// Each label looked for its return to the end of the file, and each program for an earlier one.
+#[test]
+fn twenty_thousand_labels_or_programs_take_four_times_as_long_as_five_thousand() {
+    let labels = |n: usize| format!("0 BEGIN PGM A MM\n{}END PGM A MM\n", times(n, |i| format!("LBL {i}\n")));
+    let programs = |n: usize| times(n, |i| format!("O{i}\nM99\n"));
+    assert_not_quadratic("labels.h", [5_000, 20_000].map(labels));
+    assert_not_quadratic("programs.nc", [5_000, 20_000].map(programs));
 }
 
 /// `cargo test --release -- --ignored below_a_megabyte --nocapture` prints the times of the large ones.

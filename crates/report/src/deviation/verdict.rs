@@ -4,87 +4,33 @@ use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
 use crate::document::Verdict;
 use crate::status::Status;
-use truegrind_compensation::deviation::{PathPoint, PathReport, Status as MotionStatus};
+use truegrind_compensation::deviation::{MissingMotions, PathPoint, PathReport, Status as MotionStatus};
+use truegrind_compensation::line_list::numbered;
+use truegrind_programs::motion::Place;
 
 /// A report with its largest deviation (mm) before and after correction.
 type Judged<'a> = (&'a PathReport, f64, f64);
 
+/// A reason, with the status that it gives at least.
+type Reason = (Status, String);
+
 /// The verdict on one program under all models.
 pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
-    let count = |motion_status: MotionStatus| {
-        reports
-            .iter()
-            .map(|r| r.points.iter().filter(|p| p.status == motion_status).count())
-            .max()
-            .unwrap_or(0)
-    };
-    let mut reasons = Vec::new();
-    let mut status = Status::Good;
-    for (motion_status, text) in [
-        (MotionStatus::Refused, "refused: not corrected, because that would be wrong or unsafe"),
-        (MotionStatus::Flagged, "flagged: corrected with a warning"),
-    ] {
-        let points = count(motion_status);
-        if points > 0 {
-            status = Status::Warning;
-            reasons.push(format!("{points} {} {text}", if points == 1 { "point" } else { "points" }));
-        }
-    }
     let judged: Vec<Judged<'_>> = reports
         .iter()
         .filter_map(|report| Some((*report, largest(report, BEFORE)?, largest(report, AFTER)?)))
         .collect();
+    let all_worse = judged.iter().all(|(report, before, after)| worse(report, *before, *after).is_some());
+    let mut found = uncertain_points(reports);
     for (report, before, after) in &judged {
-        let only_shape = only_shape(report);
-        if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape {
-            reasons.push(format!(
-                "{} corrects the shape of the path, from {before:.3} to {after:.3} mm RMS after the best rigid registration, and not where \
-                 it lies as a whole: {place_mm:.3} mm RMS (`compensate --placement` decides that)",
-                report.model
-            ));
-        } else if let Some(words) = worse(report, *before, *after) {
-            let all = judged.iter().all(|(report, before, after)| worse(report, *before, *after).is_some());
-            status = if all { Status::Bad } else { Status::Warning };
-            reasons.push(format!("{} {words}", report.model));
-        } else if let Some([before, after]) = bent(report) {
-            status = at_least_warning(status);
-            reasons.push(format!("{} {}", report.model, bent_words(before, after)));
-        }
-        if let Some(words) = steps(report) {
-            status = at_least_warning(status);
-            reasons.push(words);
-        }
-        // A model that corrects no cut has no correction whose certainty could be judged.
-        let corrects = report.cut().any(|p| !matches!(p.status, MotionStatus::Left));
-        if !corrects {
-            let because = report.cut().find_map(|p| p.reason.as_ref());
-            let because = because.map_or_else(String::new, |reason| format!(": {reason}"));
-            status = at_least_warning(status);
-            reasons.push(format!("{} corrects no cut{because}", report.model));
-        } else if let (Some(sigma), Some(rms)) = (report.sigma_rms_mm(), rms(report, BEFORE))
-            && sigma > rms
-            && only_shape.is_none()
-        {
-            status = at_least_warning(status);
-            reasons.push(format!(
-                "under {} the predicted 1σ of {sigma:.3} mm exceeds the deviation that it corrects, {rms:.3} mm RMS: the \
-                 model does not know enough here to say that the correction helps",
-                report.model
-            ));
-        }
+        found.extend(of_path(report, *before, *after, all_worse));
+        found.extend(steps(report).map(|words| (Status::Warning, words)));
+        found.extend(of_certainty(report));
     }
-    if let Some(missing) = reports.iter().find_map(|report| report.missing.as_ref()) {
-        status = at_least_warning(status);
-        let one = missing.motions.len() == 1;
-        let (motions, lead, them) =
-            if one { ("motion has", "it leads", "it") } else { ("motions have", "they lead", "them") };
-        reasons.push(format!(
-            "{} {motions} no deviation, since the program text does not tell where {lead} or the arm does not reach {them} ({}; --csv gives \
-             the reasons)",
-            missing.motions.len(),
-            missing.lines
-        ));
-    }
+    found.extend(missing(reports));
+    let holds = |status: &Status| found.iter().any(|(of, _)| of == status);
+    let mut status = [Status::Bad, Status::Warning].into_iter().find(holds).unwrap_or(Status::Good);
+    let mut reasons: Vec<String> = found.into_iter().map(|(_, reason)| reason).collect();
     if judged.is_empty() && matches!(status, Status::Good | Status::Warning) {
         status = Status::NotEvaluated;
     }
@@ -99,9 +45,90 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
     Verdict::new(status, headline(reports, &judged), reasons)
 }
 
-/// What is said of a program that is not the intended one with corrected targets.
-const OTHER_PROGRAM: &str = "The program differs from the intended one by more than a correction: the deviations after are not those of \
-    a corrected program";
+/// Refused and flagged points.
+fn uncertain_points(reports: &[&PathReport]) -> Vec<Reason> {
+    let count = |status: MotionStatus| {
+        let of = |report: &&PathReport| report.points.iter().filter(|point| point.status == status).count();
+        reports.iter().map(of).max().unwrap_or(0)
+    };
+    [
+        (MotionStatus::Refused, "refused: not corrected, because that would be wrong or unsafe"),
+        (MotionStatus::Flagged, "flagged: corrected with a warning"),
+    ]
+    .into_iter()
+    .filter_map(|(status, text)| match count(status) {
+        0 => None,
+        1 => Some((Status::Warning, format!("1 point {text}"))),
+        points => Some((Status::Warning, format!("{points} points {text}"))),
+    })
+    .collect()
+}
+
+/// What the correction makes of the path. `all_worse`: under every model it makes it worse.
+fn of_path(report: &PathReport, before: f64, after: f64, all_worse: bool) -> Option<Reason> {
+    if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape(report) {
+        let words = format!(
+            "{} corrects the shape of the path ({before:.3} → {after:.3} mm RMS after the best rigid registration) but not its placement: as it \
+             lies, it deviates by {place_mm:.3} mm RMS (see `compensate --placement`)",
+            report.model
+        );
+        return Some((Status::Good, words));
+    }
+    if let Some(words) = worse(report, before, after) {
+        let status = if all_worse { Status::Bad } else { Status::Warning };
+        return Some((status, format!("{} {words}", report.model)));
+    }
+    let [before, after] = bent(report)?;
+    Some((Status::Warning, format!("{} {}", report.model, bent_words(before, after))))
+}
+
+/// Whether the model corrects a cut, and knows the arm well enough for that.
+fn of_certainty(report: &PathReport) -> Option<Reason> {
+    // A model that corrects no cut has no correction whose certainty could be judged.
+    if report.cut().all(|point| point.status == MotionStatus::Left) {
+        let because = report.cut().find_map(|point| point.reason.as_ref());
+        let because = because.map_or_else(String::new, |reason| format!(": {reason}"));
+        return Some((Status::Warning, format!("{} corrects no cut{because}", report.model)));
+    }
+    let (sigma, rms) = (report.sigma_rms_mm()?, rms(report, BEFORE)?);
+    (sigma > rms && only_shape(report).is_none()).then(|| {
+        let words = format!(
+            "{}: the predicted 1σ, {sigma:.3} mm, exceeds the deviation to correct, {rms:.3} mm RMS: the model cannot say whether the correction \
+             helps here",
+            report.model
+        );
+        (Status::Warning, words)
+    })
+}
+
+/// Motions without a deviation, with the models under which they have none where these differ.
+fn missing(reports: &[&PathReport]) -> Vec<Reason> {
+    let mut groups: Vec<(&MissingMotions, Vec<&str>)> = Vec::new();
+    for (report, missing) in reports.iter().filter_map(|report| Some((report, report.missing.as_ref()?))) {
+        let alike = |(other, _): &&mut (&MissingMotions, Vec<&str>)| {
+            other.lines == missing.lines && other.motions.len() == missing.motions.len()
+        };
+        match groups.iter_mut().find(alike) {
+            Some((_, models)) => models.push(&report.model),
+            None => groups.push((missing, vec![&report.model])),
+        }
+    }
+    let sentence = |(missing, models): (&MissingMotions, Vec<&str>)| {
+        let is_of_all = models.len() == reports.len();
+        let under = if is_of_all { String::new() } else { format!("{}: ", models.join(", ")) };
+        let motions = if missing.motions.len() == 1 { "motion has" } else { "motions have" };
+        let words = format!(
+            "{under}{} {motions} no known deviation: the target is not in the program text, or out of reach ({}; reasons in --csv)",
+            missing.motions.len(),
+            missing.lines
+        );
+        (Status::Warning, words)
+    };
+    groups.into_iter().map(sentence).collect()
+}
+
+/// Headline for a program that is not the original with corrected targets.
+const OTHER_PROGRAM: &str = "The program differs from the original in more than corrected targets, so its deviations after correction mean nothing";
 
 /// Differences that are listed.
 const MAX_DIFFERENCES: usize = 10;
@@ -113,10 +140,6 @@ fn different(report: &PathReport, reasons: Vec<String>) -> Vec<String> {
     out.extend((more > 0).then(|| format!("and {more} more differences (--json lists them)")));
     out.extend(reasons);
     out
-}
-
-fn at_least_warning(status: Status) -> Status {
-    if status == Status::Good { Status::Warning } else { status }
 }
 
 /// By how much a correction may bend a path without a word (mm RMS).
@@ -150,32 +173,15 @@ fn worse(report: &PathReport, before: f64, after: f64) -> Option<String> {
     bent(report).filter(|_| after > STAYS * before).map(|[before, after]| bent_words(before, after))
 }
 
-/// Lines that are listed.
-const MAX_LINES: usize = 8;
-
-/// What is said of steps between corrected points and others.
+/// Sentence on steps between corrected points and others.
 fn steps(report: &PathReport) -> Option<String> {
     let steps = report.steps();
-    let [_, ..] = steps.points.as_slice() else { return None };
-    let mut lines: Vec<String> = steps.points.iter().map(|point| place(report, point)).collect();
-    lines.dedup();
-    let more = if lines.len() > MAX_LINES { " and more" } else { "" };
-    lines.truncate(MAX_LINES);
-    let word = if lines.len() == 1 { "line" } else { "lines" };
+    let place = |point: &&PathPoint| Place { file: point.file, line: point.line, column: 0 };
+    let lines = numbered(&report.files, steps.points.iter().map(place))?;
     Some(format!(
-        "under {} the path has steps of up to {:.3} mm between points that are corrected and neighbours that are not ({word} {}{more})",
-        report.model,
-        steps.largest_mm,
-        lines.join(", ")
+        "{}: the path steps by up to {:.3} mm between corrected points and uncorrected neighbours ({lines})",
+        report.model, steps.largest_mm
     ))
-}
-
-/// The line of a point, with its file where there are several.
-fn place(report: &PathReport, point: &PathPoint) -> String {
-    match report.files.get(point.file as usize) {
-        Some(file) => format!("{} of {file}", point.line),
-        None => point.line.to_string(),
-    }
 }
 
 /// Deviation before and after.
@@ -189,8 +195,7 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape(report) =>
         {
             format!(
-                "Shape of the path {before:.3} mm RMS before, {after:.3} mm after ({}); as a whole it lies {place_mm:.3} mm off, which is not \
-                 corrected; held-out error of the model {}",
+                "Shape of the path {before:.3} mm RMS before, {after:.3} mm after ({}); its placement is not corrected, {place_mm:.3} mm RMS as it lies; held-out error of the model {}",
                 meaning(report.after),
                 known(report.held_out_mm),
             )

@@ -3,8 +3,8 @@
 use super::side::{AFTER, has};
 use truegrind_compensation::deviation::{After, PathReport};
 
-pub(super) const REMAINDER: &str = "The predicted remainder is what is left under the model that made the correction: the error of rounding, \
-    interpolation and inverse kinematics, and where the path lies as a whole if only its shape is corrected. It does not predict the deviation of the real arm; the predicted 1σ and the held-out error of \
+pub(super) const REMAINDER: &str = "The predicted remainder is the deviation that the correcting model itself expects: rounding, interpolation, inverse kinematics, and the \
+    placement if only the shape is corrected. It does not predict the deviation of the real arm; the predicted 1σ and the held-out error of \
     the model do.";
 
 /// Heading and key of the columns after the correction.

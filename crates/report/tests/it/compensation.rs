@@ -4,9 +4,11 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 use truegrind_arm::inverse::InverseError;
+use truegrind_arm::model::Limited;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
+use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_math::option_f64::OptionF64;
 use truegrind_programs::motion::{Listing, Mark, Reason};
@@ -148,7 +150,7 @@ fn reasons_are_counted_with_their_worst_and_their_first_lines() {
 status,motions,reason,worst,lines
 refused,1,correction exceeds the bound (--max-correction),12.345 mm,grind.mod 9
 refused,1,target is out of reach,,grind.mod 10
-flagged,2,joint 5 is outside the range in which the arm was measured,7.25°,grind.mod 7–8
+flagged,2,a joint is outside the range in which the arm was measured (joint 5),7.25°,grind.mod 7–8
 left,1,\"joint target: states joints, not a pose (--joint-targets rewrites it too)\",,grind.mod 5
 left,1,a program displacement or external axis offset is or may be active,,other.mod 3
 ";
@@ -173,15 +175,37 @@ fn lines_of_successive_motions_are_a_range_and_many_ranges_are_cut_short() {
 #[test]
 fn a_cut_that_stays_names_the_line_that_caused_it() {
     let (mut plan, listing, files) = example();
-    let part = |line| Some(OutcomeReason::PartOfCut { line, because: "out of reach" });
+    let part = |line| Some(OutcomeReason::PartOfCut { line, because: "target is out of reach" });
     plan.outcomes = vec![
         outcome(2, Status::Refused, part(9)),
         outcome(3, Status::Refused, part(9)),
         outcome(5, Status::Refused, Some(OutcomeReason::Step { line: 9, mm: 0.5 })),
     ];
     let text = csv::table(&view::reason_table(&plan, &listing, &files[..1]));
-    assert!(text.contains("of this cut is not corrected: out of reach (line 9)"), "{text}");
+    assert!(text.contains("of this cut is not corrected: target is out of reach (line 9)"), "{text}");
     assert!(text.contains("would exceed --tolerance (line 9),0.500 mm,10"), "{text}");
+}
+
+/// Each made a group of its own, since their sentences name lines: a page with as many rows.
+#[test]
+fn motions_that_are_kept_for_the_sake_of_others_share_a_group_whatever_the_line() {
+    let (mut plan, listing, files) = example();
+    let for_other: [fn(u32) -> OutcomeReason; 5] = [
+        |line| OutcomeReason::HalfTurn { line },
+        |line| OutcomeReason::StartOfUnchangedArc { line },
+        |line| OutcomeReason::StartOfUnchangedCut { line },
+        |line| OutcomeReason::StartOfSingularPath { line },
+        |line| OutcomeReason::StartOfLimitedPath { line, what: Limited::joint(2) },
+    ];
+    for (index, reason) in for_other.iter().enumerate() {
+        plan.outcomes =
+            (0..7).map(|motion| outcome(motion, Status::Refused, Some(reason(20 + motion)))).collect();
+        let table = view::reason_table(&plan, &listing, &files[..1]);
+        assert_eq!(table.rows.len(), 1, "{index}");
+        let text = csv::table(&table);
+        assert!(text.contains("lines 20, 21, 22, 23 and 3 more)"), "{text}");
+        assert_eq!(text.contains("joint 3, lines"), index == 4, "{text}");
+    }
 }
 
 #[test]
@@ -239,7 +263,7 @@ fn verdict_and_page_tell_what_to_look_at() {
     let (mut plan, mut listing, files) = example();
     let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
     assert!(text.contains("[warning] Corrected, but check the refused and flagged motions"), "{text}");
-    assert!(text.contains("the path has a step of the size of the correction"), "{text}");
+    assert!(text.contains("the path steps by the size of the correction"), "{text}");
     assert!(text.contains("2 targets inserted"), "{text}");
     assert!(text.contains("- tool disc: origin not stated"), "{text}");
     assert!(text.contains("written to out/grind.mod"), "{text}");
@@ -250,8 +274,8 @@ fn verdict_and_page_tell_what_to_look_at() {
     assert!(text.contains("[warning] Corrected, but parts of the program could not be read"), "{text}");
     listing.opaque.clear();
     for (axes, loads, sentence) in [
-        (vec!['a'], 0, "[warning] Corrected for a robot that stands still"),
-        (vec![], 2, "[warning] Corrected for the tool alone where the load is known only at run time"),
+        (vec!['a'], 0, "[warning] Corrected as if the robot base never moves"),
+        (vec![], 2, "[warning] Corrected, but where GripLoad sets the load"),
     ] {
         let plan = Plan { unstated_axes: axes, unknown_loads: loads, ..plan.clone() };
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
@@ -265,6 +289,30 @@ fn verdict_and_page_tell_what_to_look_at() {
         plan.outcomes.iter_mut().for_each(|outcome| outcome.status = status);
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
         assert!(text.contains(sentence), "{text}");
+    }
+}
+
+/// The bound of a probability followed from the first word of its text, and "at most over 99.9 %" is none.
+#[test]
+fn a_probability_that_is_a_bound_by_itself_gets_no_other() {
+    let (mut plan, listing, files) = example();
+    let mut said = |probability_of_harm: f64| {
+        plan.probability_of_harm = Some(probability_of_harm);
+        plan.cuts = vec![CutRisk {
+            motions: vec![1],
+            assessed: Placement::Shape,
+            deviation_mm: 1.0,
+            sigma_mm: 0.1,
+            shape_sigma_mm: 0.1,
+            probability_of_harm,
+            left_for_risk: false,
+            corrected: true,
+        }];
+        terminal::document(&view::summary(&plan, &listing, &files), 300)
+    };
+    for (probability, words) in [(1e-9, "under 0.1 %"), (0.097, "at most 9.7 %"), (1.0, "over 99.9 %")] {
+        let text = said(probability);
+        assert!(text.contains(&format!("for any single cut: {words}\n")), "{text}");
     }
 }
 
@@ -327,7 +375,7 @@ fn work_objects_on_one_fixture_are_named_together() {
     plan.placements[0].others.clear();
     plan.placements.push(placement("wobj0", Placement::Shape, 1.5));
     let text = sentences(&plan, &listing).join("\n");
-    assert!(text.contains("against the other by up to 2.131 mm"), "{text}");
+    assert!(text.contains("against each other by up to 2.131 mm"), "{text}");
     plan.placements[1].held = true;
     assert!(!sentences(&plan, &listing).join("\n").contains("belong together"));
 }
@@ -401,7 +449,7 @@ fn a_program_that_is_corrected_again_states_no_before_and_after() {
     let mark = Mark { version: "0.1.0".to_owned(), model: "abc".to_owned(), partial: false };
     listing.marks = vec![Some(mark), None];
     let again = said(&plan, &listing);
-    assert!(again.contains("[warning] Corrected once more: the corrections add up"), "{again}");
+    assert!(again.contains("[warning] Corrected a second time: both corrections add up"), "{again}");
     assert!(!again.contains("expected after") && !again.contains("probability that"), "{again}");
 }
 
@@ -411,6 +459,6 @@ fn an_uncorrected_program_says_where_its_deviation_is_unknown() {
     let (mut plan, listing, files) = example();
     plan.outcomes.iter_mut().for_each(|outcome| outcome.status = Status::Left);
     let text = terminal::document(&view::summary(&plan, &listing, &files), 400);
-    let expected = "the uncorrected program deviates by up to 1.500 mm where it is known (not at 1 motion)";
+    let expected = "the uncorrected program deviates by up to 1.500 mm; unknown at 1 motion";
     assert!(text.contains(expected), "{text}");
 }

@@ -401,6 +401,40 @@ fn pages_of_one_model_of_several_and_of_nothing() {
     assert!(markdown::document(&view::document(&[])).contains("No program has a path"));
 }
 
+/// Under several models only the motions that the first one lacked were counted.
+#[test]
+fn motions_without_a_deviation_are_counted_under_each_model() {
+    let missing = |lines: &[u32]| {
+        let one = |line: &u32| MissingMotion {
+            points_before: 0,
+            file: 0,
+            line: *line,
+            instruction: "MoveJ".to_owned(),
+            status: Status::Left,
+            reason: None,
+        };
+        let listed: Vec<String> = lines.iter().map(u32::to_string).collect();
+        let lines_of = format!("lines {}", listed.join(", "));
+        Some(MissingMotions { motions: lines.iter().map(one).collect(), lines: lines_of })
+    };
+    let of = |model: &str, lines: &[u32]| PathReport {
+        missing: missing(lines).filter(|missing| !missing.motions.is_empty()),
+        ..raster(model, After::PredictedRemainder, 0.0)
+    };
+    let page = |reports: &[PathReport]| {
+        let page = terminal::document(&view::summary("blade.mod", reports), 200);
+        page.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let text = page(&[of("a.toml", &[]), of("b.toml", &[3]), of("c.toml", &[3, 7]), of("d.toml", &[3, 7])]);
+    assert!(text.contains("- b.toml: 1 motion has no known deviation"), "{text}");
+    assert!(text.contains("- c.toml, d.toml: 2 motions have no known deviation"), "{text}");
+    let text = page(&[of("a.toml", &[3]), of("b.toml", &[3])]);
+    assert!(
+        text.contains("- 1 motion has no known deviation") && text.matches("motion has").count() == 1,
+        "{text}"
+    );
+}
+
 #[test]
 fn a_correction_smaller_than_its_sigma_is_called_so() {
     let mut unsure = raster("m", After::PredictedRemainder, 1e-4);
@@ -410,7 +444,7 @@ fn a_correction_smaller_than_its_sigma_is_called_so() {
     unsure.points.iter_mut().for_each(|point| point.sigma_mm = Some(4.0));
     let text = page(&unsure);
     assert!(text.contains("[warning] Largest deviation"), "{text}");
-    assert!(text.contains("predicted 1σ of 4.000 mm exceeds the deviation that it corrects"), "{text}");
+    assert!(text.contains("predicted 1σ, 4.000 mm, exceeds the deviation to correct"), "{text}");
 }
 
 #[test]
@@ -450,7 +484,7 @@ fn a_corrected_shape_at_an_uncorrected_place_is_no_failure() {
     });
     let moved = report("arm", points.collect());
     let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(&moved)), 100);
-    for words in ["Shape of the path", "as a whole it lies 2.750 mm off, which is not corrected"] {
+    for words in ["Shape of the path", "its placement is not corrected, 2.750 mm RMS as it lies"] {
         assert!(page.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{words}: {page}");
     }
     assert!(!page.contains("worse"), "{page}");
@@ -484,7 +518,7 @@ fn a_path_that_is_corrected_in_part_is_judged_as_a_whole() {
     assert!(text.contains("[failed]"), "{text}");
     assert!(text.contains("bends the path: its shape goes from 0.0"), "{text}");
     assert!(
-        text.contains("steps of up to 2.0") && text.contains("neighbours that are not (line 14)"),
+        text.contains("steps by up to 2.0") && text.contains("uncorrected neighbours (line 14)"),
         "{text}"
     );
     let table = view::registered_table(std::slice::from_ref(&part));
@@ -516,10 +550,10 @@ fn a_program_that_differs_by_more_than_a_correction_fails_with_its_lines() {
     report.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
     let status = |report: &PathReport| view::status(std::slice::from_ref(report));
     assert_eq!(status(&report), ViewStatus::Good);
-    report.differences = (0..14).map(|k| format!("line {k}: MoveJ, and MoveL in the original")).collect();
+    report.differences = (0..14).map(|k| format!("line {k}: MoveJ here, MoveL in the original")).collect();
     assert_eq!(status(&report), ViewStatus::Bad);
     let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(&report)), 100);
-    assert!(page.contains("[failed] The program differs from the intended one"), "{page}");
+    assert!(page.contains("[failed] The program differs from the original"), "{page}");
     assert!(page.contains("line 0: MoveJ") && page.contains("and 4 more differences"), "{page}");
     let json = view::json(std::slice::from_ref(&report));
     assert_eq!(json["programs"][0]["models"][0]["differences"].as_array().unwrap().len(), 14);

@@ -4,8 +4,6 @@ use crate::motion::Reason;
 use crate::nc::syntax::Word;
 
 /// One block: its words, by what they state.
-///
-/// More than twenty fields: one for each kind of word that a block can have, all of them read by the interpreter alone.
 #[derive(Default)]
 pub(super) struct Block<'s> {
     pub(super) node: u32,
@@ -26,6 +24,16 @@ pub(super) struct Block<'s> {
     pub(super) feed: Option<usize>,
     pub(super) h: Option<usize>,
     pub(super) d: Option<usize>,
+    pub(super) flags: Flags,
+    /// Why the motion does not follow from the axis words alone: probing, polar coordinates, contour angles.
+    pub(super) unmodelled: Option<Reason>,
+    /// An unknown word, and why it is unknown.
+    pub(super) unknown_word: Option<(String, Reason)>,
+}
+
+/// What holds for a block as a whole.
+#[derive(Default)]
+pub(super) struct Flags {
     /// U, V, W, E: axes that are not modelled.
     pub(super) other_axes: bool,
     /// R0 (false), RL, RR, R+ and R- of Heidenhain.
@@ -36,10 +44,6 @@ pub(super) struct Block<'s> {
     pub(super) surface_normal: bool,
     /// LN: the only Heidenhain block that takes a tool vector.
     pub(super) is_ln: bool,
-    /// Why the motion does not follow from the axis words alone: probing, polar coordinates, contour angles.
-    pub(super) unmodelled: Option<Reason>,
-    /// An unknown word, and why it is unknown.
-    pub(super) unknown_word: Option<(String, Reason)>,
     /// A positioning block without L (Heidenhain).
     pub(super) paraxial: bool,
     /// Whether part of the block could not be read.

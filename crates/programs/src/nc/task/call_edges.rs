@@ -4,7 +4,7 @@
 //! Method: context-insensitive interprocedural control flow (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999, §2.5). Where a
 //! jump leads within its program is left open: it may lead to every label there.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::super::expression::Variable;
 use crate::dataflow::{Edge, propagate};
@@ -90,147 +90,252 @@ impl CallEdges {
         }
         let mut graph = Graph { count: self.points.len() as u32, ..Graph::default() };
         let callees = self.callees(names, &mut graph);
+        let mut walk = Walk::new(graph, &callees);
         let mut arrivals = Vec::new();
-        // By program: what its jumps leave, and what reaches its end.
-        let (mut jumps, mut exit) = (0, 0);
-        let mut last = Last::Node(0);
-        let mut bypassed = None;
-        let mut labels: Vec<Callee> = Vec::new();
         for (at, point) in (0_u32..).zip(&self.points) {
             let Point { flow, file, before, behind } = point;
             if let Some(previous) = at.checked_sub(1)
                 && self.points[previous as usize].behind < *before
             {
-                last = Last::Motion(before - 1);
+                walk.last = Last::Motion(before - 1);
             }
-            let here = |name: &Variable| callees.get(&(*file, name.clone())).filter(|_| !name.is_empty());
             match flow {
-                FlowPoint::File { restarts } => {
-                    // A file returns at its end, too.
-                    if at > 0 {
-                        graph.flows(last, exit);
-                    }
-                    let whole = callees[&(*file, Vec::new())];
-                    graph.edge(whole.entry, at);
-                    (jumps, exit, bypassed) = (graph.node(), whole.exit, None);
-                    labels.clear();
-                    if *restarts {
-                        graph.edge(whole.exit, at);
-                    }
-                }
-                FlowPoint::Program(name) => {
-                    let is_first = !self.points[..at as usize]
-                        .iter()
-                        .any(|other| other.file == *file && matches!(other.flow, FlowPoint::Program(_)));
-                    bypassed = Some((last, jumps, exit));
-                    // What stands before the first program number belongs to that program.
-                    if is_first {
-                        graph.flows(last, at);
-                    }
-                    if let Some(program) = here(name) {
-                        graph.edge(program.entry, at);
-                        if is_first {
-                            graph.edge(program.exit, exit);
-                        }
-                        (jumps, exit) = (graph.node(), program.exit);
-                    }
-                }
-                FlowPoint::Label(name) => {
-                    graph.flows(last, at);
-                    if let Some(label) = here(name) {
-                        graph.edge(label.entry, at);
-                        labels.push(*label);
-                    }
-                    graph.edge(jumps, at);
-                }
-                FlowPoint::Call { callee, may_skip } => {
-                    let known = callee.as_ref().map(|name| {
-                        let elsewhere = || {
-                            let mut files = 0..names.len() as u32;
-                            files
-                                .find_map(|other| callees.get(&(other, name.clone())))
-                                .filter(|_| !name.is_empty())
-                        };
-                        here(name).or_else(elsewhere)
-                    });
-                    match known {
-                        Some(Some(callee)) if !callee.is_empty => {
-                            graph.flows(last, callee.entry);
-                            graph.edge(callee.exit, at);
-                            if *may_skip {
-                                graph.flows(last, at);
-                            }
-                        }
-                        // A program that is not in these files may move or not.
-                        Some(_) => graph.flows(last, at),
-                        None => {
-                            graph.flows(last, jumps);
-                            graph.edge(exit, at);
-                            graph.flows(last, at);
-                        }
-                    }
-                }
-                FlowPoint::Return | FlowPoint::EndOfSubprogram => {
-                    graph.flows(last, exit);
-                    labels.drain(..).for_each(|label| graph.flows(last, label.exit));
-                    if let Some(main) = bypassed.filter(|_| *flow == FlowPoint::EndOfSubprogram) {
-                        (last, jumps, exit) = main;
-                    }
-                    graph.flows(last, at);
-                }
-                FlowPoint::Leaves | FlowPoint::Arrives | FlowPoint::Joins => {
-                    graph.flows(last, at);
-                    if *flow != FlowPoint::Arrives {
-                        graph.flows(last, jumps);
-                    }
-                    if *flow != FlowPoint::Leaves {
-                        graph.edge(jumps, at);
-                    }
-                }
+                FlowPoint::File { restarts } => walk.file(at, *file, *restarts),
+                FlowPoint::Program(name) => walk.program(at, *file, name),
+                FlowPoint::Label(name) => walk.label(at, *file, name),
+                FlowPoint::Call { callee, may_skip } => walk.call(at, *file, callee.as_ref(), *may_skip),
+                FlowPoint::Return => walk.end(at, false),
+                FlowPoint::EndOfSubprogram => walk.end(at, true),
+                FlowPoint::Leaves => walk.joint(at, true, false),
+                FlowPoint::Arrives => walk.joint(at, false, true),
+                FlowPoint::Joins => walk.joint(at, true, true),
             }
-            last = Last::Node(at);
+            walk.last = Last::Node(at);
             let next = self.points.get(at as usize + 1).map_or(count, |next| next.before);
             if *behind < next {
                 arrivals.push((at, *behind));
             }
         }
         let behind = self.points.last().map_or(0, |last| last.behind);
-        graph.flows(if behind < count { Last::Motion(count - 1) } else { last }, exit);
-        graph.solve(&arrivals)
+        let last = if behind < count { Last::Motion(count - 1) } else { walk.last };
+        walk.graph.flows(last, walk.exit);
+        walk.graph.solve(&arrivals)
     }
 
     /// What calls can name, by file: programs, labels, and the file itself by its name and by none.
-    fn callees(&self, names: &[String], graph: &mut Graph) -> HashMap<(u32, Variable), Callee> {
-        let mut out = HashMap::new();
-        for (at, point) in self.points.iter().enumerate() {
+    fn callees(&self, names: &[String], graph: &mut Graph) -> Callees {
+        let mut out = Callees::default();
+        for (point, extent) in self.points.iter().zip(self.extents()) {
+            let Some(Extent { end, has_calls }) = extent else { continue };
             let Point { flow, file, behind, .. } = point;
-            let ends: fn(&FlowPoint) -> bool = match flow {
-                FlowPoint::File { .. } => |_| false,
-                FlowPoint::Program(_) => |flow| matches!(flow, FlowPoint::Program(_)),
-                FlowPoint::Label(_) => |flow| *flow == FlowPoint::Return,
-                _ => continue,
-            };
-            let behind_it = self.points[at + 1..].iter().take_while(|other| other.file == *file);
-            let mut within = behind_it.clone().take_while(|other| !ends(&other.flow));
-            let calls = within.any(|other| matches!(other.flow, FlowPoint::Call { .. }));
-            let end = behind_it.clone().find(|other| ends(&other.flow)).map(|other| other.before);
-            let end =
-                end.unwrap_or_else(|| behind_it.last().map_or(*behind, |last| last.behind.max(*behind)));
-            let callee =
-                Callee { entry: graph.node(), exit: graph.node(), is_empty: !calls && end == *behind };
+            let is_empty = !has_calls && end == *behind;
+            let callee = Callee { entry: graph.node(), exit: graph.node(), is_empty };
             match flow {
                 FlowPoint::Program(name) | FlowPoint::Label(name) => {
-                    out.entry((*file, name.clone())).or_insert(callee);
+                    out.by_file.entry((*file, name.clone())).or_insert(callee);
                 }
                 _ => {
                     // Motions may follow the last point of a file.
                     let callee = Callee { is_empty: false, ..callee };
-                    out.insert((*file, Vec::new()), callee);
-                    out.entry((*file, program_of(&names[*file as usize]))).or_insert(callee);
+                    out.by_file.insert((*file, Vec::new()), callee);
+                    out.by_file.entry((*file, program_of(&names[*file as usize]))).or_insert(callee);
                 }
             }
         }
+        let mut files: Vec<_> = out.by_file.iter().collect();
+        files.sort_unstable_by_key(|((file, _), _)| *file);
+        for ((_, name), callee) in files {
+            out.anywhere.entry(name.clone()).or_insert(*callee);
+        }
         out
+    }
+
+    /// Of each point that begins what calls can name: how far that goes. From behind, since a search from each point to the end of the file
+    /// takes quadratic time.
+    fn extents(&self) -> Vec<Option<Extent>> {
+        let mut out = vec![None; self.points.len()];
+        let mut behind_it = BehindIt::default();
+        for (at, point) in self.points.iter().enumerate().rev() {
+            if self.points.get(at + 1).is_some_and(|next| next.file != point.file) {
+                behind_it = BehindIt::default();
+            }
+            let whole = behind_it.last.map_or(point.behind, |last| last.max(point.behind));
+            let extent =
+                |until: Until| Extent { end: until.end.unwrap_or(whole), has_calls: until.has_calls };
+            out[at] = match &point.flow {
+                FlowPoint::File { .. } => Some(extent(behind_it.file)),
+                FlowPoint::Program(_) => Some(extent(behind_it.program)),
+                FlowPoint::Label(_) => Some(extent(behind_it.label)),
+                _ => None,
+            };
+            behind_it.add(point);
+        }
+        out
+    }
+}
+
+/// How far a program, a label or a file goes.
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    /// The motions before it end there.
+    end: u32,
+    has_calls: bool,
+}
+
+/// The next point that ends something, and whether a call stands before it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Until {
+    end: Option<u32>,
+    has_calls: bool,
+}
+
+/// What stands behind a point in its file.
+#[derive(Debug, Default)]
+struct BehindIt {
+    /// Nothing ends a file but the last of its points.
+    file: Until,
+    /// Until the next program.
+    program: Until,
+    /// Until the next return.
+    label: Until,
+    /// Behind the last point.
+    last: Option<u32>,
+}
+
+impl BehindIt {
+    fn add(&mut self, point: &Point) {
+        let ends_here = Until { end: Some(point.before), has_calls: false };
+        match point.flow {
+            FlowPoint::Call { .. } => {
+                [&mut self.file, &mut self.program, &mut self.label]
+                    .into_iter()
+                    .for_each(|until| until.has_calls = true);
+            }
+            FlowPoint::Program(_) => self.program = ends_here,
+            FlowPoint::Return => self.label = ends_here,
+            _ => {}
+        }
+        self.last.get_or_insert(point.behind);
+    }
+}
+
+/// The nodes of everything that calls can name.
+#[derive(Debug, Default)]
+struct Callees {
+    by_file: HashMap<(u32, Variable), Callee>,
+    /// Of the first file that has it.
+    anywhere: HashMap<Variable, Callee>,
+}
+
+/// The walk over the points of all files.
+struct Walk<'c> {
+    graph: Graph,
+    callees: &'c Callees,
+    last: Last,
+    /// What the jumps of the current program leave.
+    jumps: u32,
+    /// What reaches its end.
+    exit: u32,
+    /// What goes on behind the current program: `last`, `jumps` and `exit`.
+    bypassed: Option<(Last, u32, u32)>,
+    /// The labels that the next return ends.
+    labels: Vec<Callee>,
+    /// The files in which a program has begun.
+    begun: HashSet<u32>,
+}
+
+impl<'c> Walk<'c> {
+    fn new(graph: Graph, callees: &'c Callees) -> Self {
+        let (labels, begun) = (Vec::new(), HashSet::new());
+        Self { graph, callees, last: Last::Node(0), jumps: 0, exit: 0, bypassed: None, labels, begun }
+    }
+
+    fn here(&self, file: u32, name: &Variable) -> Option<Callee> {
+        if name.is_empty() { None } else { self.callees.by_file.get(&(file, name.clone())).copied() }
+    }
+
+    fn file(&mut self, at: u32, file: u32, restarts: bool) {
+        // A file returns at its end, too.
+        if at > 0 {
+            self.graph.flows(self.last, self.exit);
+        }
+        let whole = self.callees.by_file[&(file, Vec::new())];
+        self.graph.edge(whole.entry, at);
+        (self.jumps, self.exit, self.bypassed) = (self.graph.node(), whole.exit, None);
+        self.labels.clear();
+        if restarts {
+            self.graph.edge(whole.exit, at);
+        }
+    }
+
+    fn program(&mut self, at: u32, file: u32, name: &Variable) {
+        let is_first = self.begun.insert(file);
+        self.bypassed = Some((self.last, self.jumps, self.exit));
+        // What stands before the first program number belongs to that program.
+        if is_first {
+            self.graph.flows(self.last, at);
+        }
+        if let Some(program) = self.here(file, name) {
+            self.graph.edge(program.entry, at);
+            if is_first {
+                self.graph.edge(program.exit, self.exit);
+            }
+            (self.jumps, self.exit) = (self.graph.node(), program.exit);
+        }
+    }
+
+    fn label(&mut self, at: u32, file: u32, name: &Variable) {
+        self.graph.flows(self.last, at);
+        if let Some(label) = self.here(file, name) {
+            self.graph.edge(label.entry, at);
+            self.labels.push(label);
+        }
+        self.graph.edge(self.jumps, at);
+    }
+
+    /// `callee`: `None` for a label of the same program whose name is open.
+    fn call(&mut self, at: u32, file: u32, callee: Option<&Variable>, may_skip: bool) {
+        let Some(name) = callee else {
+            self.graph.flows(self.last, self.jumps);
+            self.graph.edge(self.exit, at);
+            self.graph.flows(self.last, at);
+            return;
+        };
+        let elsewhere = || self.callees.anywhere.get(name).copied().filter(|_| !name.is_empty());
+        match self.here(file, name).or_else(elsewhere) {
+            Some(callee) if !callee.is_empty => {
+                self.graph.flows(self.last, callee.entry);
+                self.graph.edge(callee.exit, at);
+                if may_skip {
+                    self.graph.flows(self.last, at);
+                }
+            }
+            // A program that is not in these files may move or not.
+            _ => self.graph.flows(self.last, at),
+        }
+    }
+
+    /// A return, or the end of a subprogram that the main program bypasses.
+    fn end(&mut self, at: u32, is_bypassed: bool) {
+        self.graph.flows(self.last, self.exit);
+        for label in self.labels.drain(..) {
+            self.graph.flows(self.last, label.exit);
+        }
+        if let Some(main) = self.bypassed.filter(|_| is_bypassed) {
+            (self.last, self.jumps, self.exit) = main;
+        }
+        self.graph.flows(self.last, at);
+    }
+
+    /// A point at which control may leave for, or arrive from, elsewhere in the program.
+    fn joint(&mut self, at: u32, leaves: bool, arrives: bool) {
+        self.graph.flows(self.last, at);
+        if leaves {
+            self.graph.flows(self.last, self.jumps);
+        }
+        if arrives {
+            self.graph.edge(self.jumps, at);
+        }
     }
 }
 

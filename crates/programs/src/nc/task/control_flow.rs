@@ -196,7 +196,7 @@ impl Interpreter<'_, '_> {
         match address_effect(name) {
             Some(AddressEffect::None) => {}
             Some(AddressEffect::Unmodelled(reason)) => block.unmodelled = Some(reason),
-            Some(AddressEffect::OtherAxes) => block.other_axes = true,
+            Some(AddressEffect::OtherAxes) => block.flags.other_axes = true,
             // Handled by `tool_words`.
             Some(AddressEffect::Tool) => {}
             // A name of the control or of a machine axis, or a variable of another file.
@@ -349,11 +349,11 @@ impl Interpreter<'_, '_> {
             None => true,
         };
         if !is_own {
-            self.listing.external_calls.push(self.listing.motions.len() as u32);
+            self.listing.nc.external_calls.push(self.listing.motions.len() as u32);
         }
         self.list_left(block, name, Reason::Subprogram);
         self.join_unseen_predecessors();
-        let (next, may_skip) = (self.listing.motions.len() as u32, block.skippable);
+        let (next, may_skip) = (self.listing.motions.len() as u32, block.flags.skippable);
         self.call_edges.push(FlowPoint::Call { callee, may_skip }, self.file, next, true);
     }
 

@@ -73,7 +73,7 @@ impl Interpreter<'_, '_> {
             block.axes.iter().map(|word| word.map(value).transpose()).collect();
         let rpl = block.words.iter().find(|word| word.is("RPL"));
         // Offsets of rotary axes change the orientation that A, B and C state.
-        let rotary = block.abc.iter().any(Option::is_some) || block.other_axes;
+        let rotary = block.abc.iter().any(Option::is_some) || block.flags.other_axes;
         match (name, values) {
             (_, Err(_)) => None,
             _ if rotary => None,

@@ -215,7 +215,7 @@ impl Interpreter<'_, '_> {
     /// The kinds of word in a block.
     pub(super) fn word_kinds(&self, block: &Block<'_>) -> super::g_codes::WordKinds {
         super::g_codes::WordKinds {
-            axes: block.has_motion_words() || block.other_axes,
+            axes: block.has_motion_words() || block.flags.other_axes,
             centre: block.centre.iter().any(Option::is_some),
         }
     }

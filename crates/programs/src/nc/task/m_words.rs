@@ -18,7 +18,7 @@ impl Interpreter<'_, '_> {
         let linux_like = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Iso);
         if linux_like && block.m.iter().any(|m| is_output(*m)) {
             // E is the number of an output.
-            block.other_axes =
+            block.flags.other_axes =
                 block.words.iter().any(|word| matches!(word.address(), Some(b'U' | b'V' | b'W')));
         }
         if block.m.contains(&19)
@@ -31,7 +31,7 @@ impl Interpreter<'_, '_> {
         if self.dialect == Dialect::Iso && block.g.is_empty() && block.m.iter().any(|m| is_setting(*m)) {
             let none = [None; 3];
             (block.axes, block.abc, block.centre, block.radius) = (none, none, none, None);
-            (block.feed, block.other_axes) = (None, false);
+            (block.feed, block.flags.other_axes) = (None, false);
         }
     }
 
@@ -72,7 +72,7 @@ impl Interpreter<'_, '_> {
     /// function.
     fn takes_axes(&self, block: &Block<'_>, m: u32) -> bool {
         let first = block.words.iter().find(|word| word.address() != Some(b'N'));
-        (block.has_motion_words() || block.other_axes)
+        (block.has_motion_words() || block.flags.other_axes)
             && block.g.is_empty()
             && first
                 .is_some_and(|word| word.address() == Some(b'M') && self.literal(word) == Some(f64::from(m)))

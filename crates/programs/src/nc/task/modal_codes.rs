@@ -180,7 +180,7 @@ impl Interpreter<'_, '_> {
     /// Whether G50 or G92 states a spindle speed limit, and not a position.
     pub(super) fn limits_spindle(&self, block: &Block<'_>) -> bool {
         !block.has_motion_words()
-            && !block.other_axes
+            && !block.flags.other_axes
             && block.words.iter().any(|word| word.address() == Some(b'S'))
     }
 

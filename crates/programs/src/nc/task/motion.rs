@@ -33,7 +33,7 @@ impl Interpreter<'_, '_> {
         let modal = Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START };
         Motion {
             rapid: kind == MotionKind::Joint,
-            conditional: block.skippable,
+            conditional: block.flags.skippable,
             previous: self.state.previous,
             ..Motion::new(place, statement, self.instruction(name), kind, modal)
         }
@@ -82,7 +82,7 @@ impl Interpreter<'_, '_> {
             _ if block.unmodelled == Some(Reason::UnsupportedPath) => StartDependency::Position,
             // No word can be added to a block with R+, and no A, B, C to such an LN: the omitted values stay in
             // effect.
-            _ if block.paraxial_compensation => StartDependency::Position,
+            _ if block.flags.paraxial_compensation => StartDependency::Position,
             _ if block.unmodelled == Some(Reason::AlignedToNormal) && block.axes.contains(&None) => {
                 StartDependency::Position
             }
@@ -116,7 +116,7 @@ impl Interpreter<'_, '_> {
             vector_words: state.groups.vector_words(),
             arc,
             insertable: false,
-            paraxial: block.paraxial,
+            paraxial: block.flags.paraxial,
             can_restate: false,
             may_omit_words: self.may_omit_words(block),
             start_dependency: StartDependency::Independent,
@@ -182,7 +182,7 @@ impl Interpreter<'_, '_> {
     /// Interprets the motion of a block.
     pub(super) fn motion(&mut self, block: &Block<'_>, machine: bool) {
         let heidenhain = self.dialect == Dialect::Heidenhain;
-        let mode = if heidenhain && block.rapid && self.state.mode == MotionMode::Linear {
+        let mode = if heidenhain && block.flags.rapid && self.state.mode == MotionMode::Linear {
             MotionMode::Rapid
         } else {
             self.state.mode
@@ -232,8 +232,8 @@ impl Interpreter<'_, '_> {
             motion.speed = None;
         }
         let splits = !motion.timed && self.can_split(block, &before);
-        motion.insertable = splits && kind == MotionKind::Linear && !block.other_axes;
-        motion.can_straighten = splits && arc.is_some() && !block.opaque;
+        motion.insertable = splits && kind == MotionKind::Linear && !block.flags.other_axes;
+        motion.can_straighten = splits && arc.is_some() && !block.flags.opaque;
         motion.axis = arc.map(|block_arc| Box::new(block_arc.arc.plane.axis(block_arc.positive)));
         motion.by_radius = arc.is_some() && block.radius.is_some();
         let after = self.block_context(block, arc);
@@ -263,7 +263,7 @@ impl Interpreter<'_, '_> {
         rotations: [Rotation; 2],
         motion: &mut Motion,
     ) -> Option<BlockArc> {
-        let value = match block.paraxial_compensation {
+        let value = match block.flags.paraxial_compensation {
             true => Err(Reason::RadiusCompensation),
             false => target(to, rotations[1]),
         };
@@ -293,7 +293,7 @@ impl Interpreter<'_, '_> {
         self.word_semantics == self.state.word_semantics()
             && !begins_something(block)
             && self.dialect != Dialect::Heidenhain
-            && !block.skippable
+            && !block.flags.skippable
             && before.start.iter().all(Option::is_some)
     }
 
@@ -308,7 +308,7 @@ impl Interpreter<'_, '_> {
             let call = self.state.modal_call;
             // G66 has been listed itself.
             if !self.dialect.paren_comments() {
-                self.listing.external_calls.push(self.listing.motions.len() as u32 - 1);
+                self.listing.nc.external_calls.push(self.listing.motions.len() as u32 - 1);
             }
             self.join_unseen_predecessors();
             let callee = Some(self.pass.modal_callee.clone().unwrap_or_default());
@@ -322,8 +322,8 @@ impl Interpreter<'_, '_> {
             || machine
             || call.is_some()
             || matches!(block.unmodelled, Some(Reason::Transformed | Reason::UnsupportedPath | Reason::Probe))
-            || block.opaque
-            || block.other_axes && self.has_incremental_uvw()
+            || block.flags.opaque
+            || block.flags.other_axes && self.has_incremental_uvw()
         {
             self.invalidate_position();
         } else if block.unmodelled == Some(Reason::AlignedToNormal) {
@@ -336,10 +336,10 @@ impl Interpreter<'_, '_> {
             self.state.invalidate_orientation();
             self.events.push(StateEvent::AxesUnknown(super::ORIENTATION));
         }
-        if block.paraxial_compensation {
+        if block.flags.paraxial_compensation {
             self.invalidate_named_axes(block);
         }
-        if block.opaque || self.pass.contour_end.is_some() {
+        if block.flags.opaque || self.pass.contour_end.is_some() {
             self.invalidate_pose();
         }
         // If it is unknown how numbers are read, so is the end position.
@@ -359,7 +359,7 @@ impl Interpreter<'_, '_> {
     fn can_restate(&self, block: &Block<'_>, motion: &Motion) -> bool {
         let straight = matches!(motion.kind, MotionKind::Linear | MotionKind::Joint);
         let plain =
-            straight && !block.opaque && block.unmodelled.is_none() && self.pass.contour_end.is_none();
+            straight && !block.flags.opaque && block.unmodelled.is_none() && self.pass.contour_end.is_none();
         let set_before_branch = !(ModalGroup::RadiusCompensation.bit() | TOOL_GROUPS) & MOTION_GROUPS;
         // A cycle runs at the position that the words state.
         let call = self.modal_call(block);
@@ -371,7 +371,7 @@ impl Interpreter<'_, '_> {
             && self.state.unknown_reason(set_before_branch).is_none()
             && match motion.own_reason {
                 None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
-                Some(Reason::UnsupportedPath) => block.corner,
+                Some(Reason::UnsupportedPath) => block.flags.corner,
                 Some(Reason::Cycle) => call.is_some(),
                 _ => false,
             }
@@ -399,7 +399,7 @@ impl Interpreter<'_, '_> {
 
     /// Lists the further axes that a block names. On a Fanuc U, V and W are increments of X, Y and Z.
     fn note_other_axes(&mut self, block: &Block<'_>) {
-        if !block.other_axes || self.has_incremental_uvw() {
+        if !block.flags.other_axes || self.has_incremental_uvw() {
             return;
         }
         let letter = |word: &Word<'_>| match word.name.to_ascii_uppercase().as_slice() {
@@ -409,17 +409,17 @@ impl Interpreter<'_, '_> {
         for word in &block.words {
             if let Some(letter) = letter(word) {
                 let place = self.place(word.first);
-                self.listing.other_axes.entry(letter).or_insert(place);
+                self.listing.nc.other_axes.entry(letter).or_insert(place);
             }
         }
     }
 
     /// A block without modelled axis words: it may move other axes, or could not be read.
     fn block_without_axes(&mut self, block: &Block<'_>, mode: MotionMode) {
-        if !block.opaque && self.calls_cycle(block) {
+        if !block.flags.opaque && self.calls_cycle(block) {
             return;
         }
-        if block.opaque {
+        if block.flags.opaque {
             self.list_left(block, "?", Reason::Unreadable);
             self.invalidate_pose();
         } else if let Some(reason) = block.unmodelled {
@@ -431,7 +431,7 @@ impl Interpreter<'_, '_> {
                 self.list_left(block, "path", reason);
                 self.invalidate_pose();
             }
-        } else if block.other_axes {
+        } else if block.flags.other_axes {
             self.list_left(block, "axes", Reason::ExternalOnly);
             if self.has_incremental_uvw() {
                 self.invalidate_position();
@@ -482,7 +482,7 @@ impl Interpreter<'_, '_> {
         // P: turns of LinuxCNC; Q, L: spirals and cones.
         let more = self.dialect != Dialect::Siemens
             && (block.p.is_some_and(|index| !one(index)) || block.q.is_some() || block.l.is_some());
-        if block.special_arc || more {
+        if block.flags.special_arc || more {
             return Err(Reason::UnsupportedPath);
         }
         let (start, end) = (all_known(from)?, all_known(to)?);
@@ -549,11 +549,11 @@ impl Interpreter<'_, '_> {
             !matches!(state.orientation.mode, OrientationMode::Unknown(Reason::OrientationUnknown));
         let requires_tcp_mode =
             matches!(self.dialect, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain);
-        if block.opaque {
+        if block.flags.opaque {
             Some(Reason::Unreadable)
-        } else if block.skippable {
+        } else if block.flags.skippable {
             Some(Reason::Skippable)
-        } else if block.corner {
+        } else if block.flags.corner {
             Some(Reason::UnsupportedPath)
         } else if let MotionMode::Unsupported(reason) = mode {
             Some(reason)
@@ -569,7 +569,7 @@ impl Interpreter<'_, '_> {
             Some(reason)
         } else if state.groups.active_transforms() != 0 {
             Some(Reason::Transformed)
-        } else if block.other_axes && self.has_incremental_uvw() {
+        } else if block.flags.other_axes && self.has_incremental_uvw() {
             Some(Reason::UnknownWord)
         } else if self.dialect == Dialect::Heidenhain
             && matches!(mode, MotionMode::Circular(_))

@@ -138,7 +138,7 @@ impl Interpreter<'_, '_> {
 
     /// Whether an unknown name is a subprogram call: it comes first, alone or with a repeat count (P).
     fn is_call(&self, block: &Block<'_>, index: usize) -> bool {
-        !block.opaque
+        !block.flags.opaque
             && block.words.iter().enumerate().all(|(at, word)| {
                 at == index || matches!(word.address(), Some(b'N' | b'P' | b'M' | b'F' | b'S' | b'T' | b'D'))
             })

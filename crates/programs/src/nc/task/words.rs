@@ -27,17 +27,17 @@ impl<'s> Interpreter<'_, 's> {
         m.clear();
         *block = Block { node, words, g, m, ..Block::default() };
         let kind = self.tree.nodes.kind(node);
-        block.skippable = kind == Syntax::Skippable;
-        block.opaque = kind == Syntax::Opaque;
+        block.flags.skippable = kind == Syntax::Skippable;
+        block.flags.opaque = kind == Syntax::Opaque;
         if self.tree.nodes.get(node).size > BLOCK_WORDS {
-            (block.opaque, block.opaque_may_set) = (true, true);
+            (block.flags.opaque, block.flags.opaque_may_set) = (true, true);
             return;
         }
         for child in self.tree.child_nodes(node) {
             if self.tree.nodes.kind(child) == Syntax::Opaque {
                 let Node { first, end, .. } = self.tree.nodes.get(child);
-                block.opaque = true;
-                block.opaque_may_set |= self.may_set(first, end);
+                block.flags.opaque = true;
+                block.flags.opaque_may_set |= self.may_set(first, end);
                 continue;
             }
             let found = word(self.tree, child);
@@ -47,22 +47,24 @@ impl<'s> Interpreter<'_, 's> {
             self.collect_word(block, index);
         }
         self.values_of_m(block);
-        if block.surface_normal && block.vector.iter().all(Option::is_none) && self.may_turn_to_normal(block)
+        if block.flags.surface_normal
+            && block.vector.iter().all(Option::is_none)
+            && self.may_turn_to_normal(block)
         {
             block.unmodelled.get_or_insert(Reason::AlignedToNormal);
         }
         // Elsewhere the control rejects a tool vector.
         let heidenhain = self.dialect == Dialect::Heidenhain;
-        block.opaque |= heidenhain && !block.is_ln && block.vector.iter().any(Option::is_some);
+        block.flags.opaque |= heidenhain && !block.flags.is_ln && block.vector.iter().any(Option::is_some);
         let first = block.words.first();
-        block.paraxial = heidenhain
+        block.flags.paraxial = heidenhain
             && first.is_some_and(|word| is_axis_name(word.name) && word.value != WordValue::Absent);
         // Two different motion codes: which one holds depends on the control.
         let mut modes = block.g.iter().filter(|&&code| matches!(code, 0 | 10 | 20 | 30));
         if let Some(first) = modes.next()
             && modes.any(|other| other != first)
         {
-            block.opaque = true;
+            block.flags.opaque = true;
         }
     }
 
@@ -116,20 +118,22 @@ impl<'s> Interpreter<'_, 's> {
             Some(b'Y') => put(&mut block.axes[1]),
             Some(b'Z') => put(&mut block.axes[2]),
             Some(b'C') if heidenhain && word.value == WordValue::Absent => {}
-            Some(b'C' | b'R') if comma => block.corner = true,
+            Some(b'C' | b'R') if comma => block.flags.corner = true,
             // `,A45.`: the angle of the line.
-            Some(_) if comma => (block.corner, block.unmodelled) = (true, Some(Reason::UnsupportedPath)),
+            Some(_) if comma => {
+                (block.flags.corner, block.unmodelled) = (true, Some(Reason::UnsupportedPath))
+            }
             Some(letter @ (b'A' | b'B' | b'C')) => put(&mut block.abc[usize::from(letter - b'A')]),
             Some(letter @ (b'I' | b'J' | b'K')) => put(&mut block.centre[usize::from(letter - b'I')]),
             Some(b'R') if heidenhain => match (word.value, self.literal(&word)) {
                 (WordValue::Literal { sign: None, .. }, Some(value))
                     if value == 0.0 || !block.words.first().is_some_and(|word| word.is("CR")) =>
                 {
-                    block.radius_compensation = Some(value != 0.0);
+                    block.flags.radius_compensation = Some(value != 0.0);
                 }
                 // R+ and R- lengthen or shorten the motion of a paraxial block.
                 (WordValue::Absent, _) => {
-                    (block.radius_compensation, block.paraxial_compensation) = (Some(true), true)
+                    (block.flags.radius_compensation, block.flags.paraxial_compensation) = (Some(true), true)
                 }
                 _ => put(&mut block.radius),
             },
@@ -140,12 +144,12 @@ impl<'s> Interpreter<'_, 's> {
             Some(b'Q') => block.q = at,
             Some(b'H') => block.h = at,
             Some(b'D') => block.d = at,
-            Some(b'U' | b'V' | b'W') => block.other_axes = true,
-            Some(b'E') if self.dialect != Dialect::Fanuc => block.other_axes = true,
+            Some(b'U' | b'V' | b'W') => block.flags.other_axes = true,
+            Some(b'E') if self.dialect != Dialect::Fanuc => block.flags.other_axes = true,
             Some(_) => {}
             None => self.collect_name(block, index),
         }
-        block.opaque |= twice && (self.dialect != Dialect::Siemens || word.value != WordValue::Absent);
+        block.flags.opaque |= twice && (self.dialect != Dialect::Siemens || word.value != WordValue::Absent);
     }
 
     /// Whether a word of a Heidenhain block is a value of an M word before it (M118 X1, M94 C), or of one of unknown
@@ -171,10 +175,10 @@ impl<'s> Interpreter<'_, 's> {
             (Dialect::Siemens, [letter @ b'A'..=b'C', b'2']) => block.rpy[usize::from(letter - b'A')] = at,
             (Dialect::Siemens, b"THETA") => block.spin = at,
             (Dialect::Siemens, b"CR") => block.radius = at,
-            (Dialect::Siemens, b"TURN" | b"AR" | b"I1" | b"J1" | b"K1") => block.special_arc = true,
-            (Dialect::Siemens, b"RND" | b"CHF" | b"CHR") => block.corner = true,
-            (Dialect::Siemens, b"RNDM") => block.corner = self.evaluate_word(&word).0 != Ok(0.0),
-            (Dialect::Siemens, b"SUPA" | b"G153") => block.machine_coordinates = true,
+            (Dialect::Siemens, b"TURN" | b"AR" | b"I1" | b"J1" | b"K1") => block.flags.special_arc = true,
+            (Dialect::Siemens, b"RND" | b"CHF" | b"CHR") => block.flags.corner = true,
+            (Dialect::Siemens, b"RNDM") => block.flags.corner = self.evaluate_word(&word).0 != Ok(0.0),
+            (Dialect::Siemens, b"SUPA" | b"G153") => block.flags.machine_coordinates = true,
             (Dialect::Siemens, _) => self.collect_siemens_name(block, index, &name),
             (Dialect::Heidenhain, [b'I', letter @ b'X'..=b'Z']) => {
                 block.axes[usize::from(letter - b'X')] = at
@@ -183,16 +187,16 @@ impl<'s> Interpreter<'_, 's> {
             (Dialect::Heidenhain, [b'T', letter @ b'X'..=b'Z']) => {
                 block.vector[usize::from(letter - b'X')] = at
             }
-            (Dialect::Heidenhain, [b'I', b'U'..=b'W']) => block.other_axes = true,
-            (Dialect::Heidenhain, b"FMAX") => block.rapid = true,
-            (Dialect::Heidenhain, b"RL" | b"RR") => block.radius_compensation = Some(true),
+            (Dialect::Heidenhain, [b'I', b'U'..=b'W']) => block.flags.other_axes = true,
+            (Dialect::Heidenhain, b"FMAX") => block.flags.rapid = true,
+            (Dialect::Heidenhain, b"RL" | b"RR") => block.flags.radius_compensation = Some(true),
             (
                 Dialect::Heidenhain,
                 b"L" | b"CC" | b"CR" | b"CT" | b"DR" | b"FU" | b"FZ" | b"FAUTO" | b"AUTO" | b"FQ" | b"FQL"
                 | b"FQR" | b"FT" | b"LA" | b"MB" | b"MAX" | b"TCPM",
             ) => {}
-            (Dialect::Heidenhain, b"NX" | b"NY" | b"NZ") => block.surface_normal = true,
-            (Dialect::Heidenhain, b"LN") => block.is_ln = true,
+            (Dialect::Heidenhain, b"NX" | b"NY" | b"NZ") => block.flags.surface_normal = true,
+            (Dialect::Heidenhain, b"LN") => block.flags.is_ln = true,
             (Dialect::Heidenhain, _) => {
                 let text = String::from_utf8_lossy(&name).into_owned();
                 block.unknown_word = Some((text, Reason::UnknownWord));

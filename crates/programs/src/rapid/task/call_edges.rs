@@ -120,119 +120,13 @@ impl CallEdges {
         if self.calls.is_empty() && !self.branched.contains(&true) {
             return Default::default();
         }
-        let passes = self.passing(symbols);
-        let nodes = Nodes { units: self.ends.len() as u32, calls: self.calls.len() as u32 };
-        let count = nodes.iteration(self.iterations.len() as u32) as usize;
-        let mut last = vec![MotionSet::default(); count];
-        let mut edges: Vec<Edge<()>> = Vec::new();
-        // What may be last according to a set of a unit: motions, and nodes.
-        let sources = |unit: u32, reaching: &ReachingMotions, found: &mut dyn FnMut(Result<u32, u32>)| {
-            for &known in reaching.known() {
-                match known {
-                    Last::Motion(motion) => found(Ok(motion)),
-                    Last::Iteration(at) => found(Err(nodes.iteration(at))),
-                    Last::Call(call) => {
-                        let callee = self.calls[call as usize].callee;
-                        found(Err(nodes.end(callee)));
-                        if passes[callee as usize] {
-                            found(Err(nodes.before(call)));
-                        }
-                    }
-                }
-            }
-            if reaching.anywhere {
-                found(Err(nodes.anywhere(unit)));
-            }
-            if reaching.entry {
-                found(Err(nodes.entry(unit)));
-            }
-        };
-        // Units that no call enters: the program's start, its next cycle, interrupts.
-        let mut is_called = vec![false; self.ends.len()];
-        self.calls.iter().for_each(|call| is_called[call.callee as usize] = true);
-        for (list, routines) in symbols.late_lists.iter().enumerate() {
-            if is_called[symbols.units.len() + list] {
-                routines.iter().for_each(|routine| is_called[symbols.unit_of(*routine) as usize] = true);
-            }
-        }
-        for (unit, is_called) in (0..).zip(&is_called) {
-            let is_entered = |unit: &Unit| {
-                let starts = |routine: u32| mains.contains(&routine) || symbols.interrupts[routine as usize];
-                unit.routine.is_some_and(starts)
-            };
-            if !is_called || symbols.units.get(unit as usize).is_some_and(is_entered) {
-                last[nodes.entry(unit) as usize].0.push(ELSEWHERE);
-            }
-        }
-        let mut flows_into = |node: u32, unit: u32, reaching: &ReachingMotions| {
-            if reaching.elsewhere {
-                last[node as usize].0.push(ELSEWHERE);
-            }
-            sources(unit, reaching, &mut |found| match found {
-                Ok(motion) => last[node as usize].0.push(motion),
-                Err(from) => edges.push((from, node, ())),
-            });
-        };
-        for (unit, end) in (0..).zip(&self.ends) {
-            // What was last before the routine is the caller's to know.
-            flows_into(nodes.end(unit), unit, &end.within_routine());
-        }
-        for (call, at) in (0..).zip(&self.calls) {
-            flows_into(nodes.entry(at.callee), at.caller, &at.before);
-            if passes[at.callee as usize] {
-                flows_into(nodes.before(call), at.caller, &at.before);
-            }
-        }
-        for (at, (unit, end)) in (0..).zip(&self.iterations) {
-            flows_into(nodes.iteration(at), *unit, end);
-        }
-        for (list, routines) in (symbols.units.len() as u32..).zip(&symbols.late_lists) {
-            for unit in routines.iter().map(|routine| symbols.unit_of(*routine)) {
-                edges.push((nodes.end(unit), nodes.end(list), ()));
-                edges.push((nodes.entry(list), nodes.entry(unit), ()));
-            }
-        }
-        let befores = self.calls.iter().map(|call| &call.before);
-        let of_loops = self.iterations.iter().map(|(_, end)| end);
-        let of_arrivals = self.arrivals.iter().map(|(.., before)| before);
-        if befores.chain(of_loops).chain(of_arrivals).chain(&self.ends).any(|reaching| reaching.anywhere) {
-            for (motion, unit) in (0..).zip(units) {
-                last[nodes.anywhere(*unit) as usize].0.push(motion);
-            }
-            let of_calls = self.calls.iter();
-            edges.extend(of_calls.map(|call| (nodes.end(call.callee), nodes.anywhere(call.caller), ())));
-            edges.extend((0..nodes.units).map(|unit| (nodes.entry(unit), nodes.anywhere(unit), ())));
-        }
-        edges.sort_unstable();
-        edges.dedup();
-        last.iter_mut().for_each(MotionSet::normalise);
-        let height = last.iter().map(|motions| motions.0.len()).sum();
-        propagate(&mut last, height, &mut edges, |(), motions| motions.clone());
-        let mut out = Vec::new();
-        let mut predecessors = BTreeMap::new();
-        for ((unit, motion, before), branched) in self.arrivals.iter().zip(&self.branched) {
-            let mut all = MotionSet::default();
-            sources(*unit, before, &mut |found| match found {
-                Ok(motion) => all.0.push(motion),
-                Err(node) => {
-                    let known = last[node as usize].0.iter().filter(|before| **before != ELSEWHERE);
-                    out.extend(known.map(|before| [*before, *motion]));
-                    if *branched && all.0.len() <= MOST_PREDECESSORS {
-                        all.0.extend(&last[node as usize].0);
-                    }
-                }
-            });
-            all.normalise();
-            if *branched && !all.0.contains(&ELSEWHERE) && (1..=MOST_PREDECESSORS).contains(&all.0.len()) {
-                predecessors.insert(*motion, all.0);
-            }
-        }
-        if self.calls.is_empty() {
-            return (Vec::new(), predecessors);
-        }
-        out.sort_unstable();
-        out.dedup();
-        (out, predecessors)
+        let mut graph = Graph::of(self, symbols);
+        graph.add_elsewhere(symbols, mains);
+        graph.add_flows();
+        graph.add_late_lists(symbols);
+        graph.add_anywhere(units);
+        graph.solve();
+        graph.collect()
     }
 
     /// Which units may end without a motion.
@@ -278,5 +172,176 @@ impl CallEdges {
                 return units;
             }
         }
+    }
+}
+
+/// What may be last according to a set of motions.
+enum Source {
+    Motion(u32),
+    /// Any motion that reaches this node.
+    Node(u32),
+}
+
+/// The sets of motions, and what flows from one into another.
+struct Graph<'c> {
+    found: &'c CallEdges,
+    nodes: Nodes,
+    /// Which units may end without a motion.
+    passes: Vec<bool>,
+    /// By node.
+    last: Vec<MotionSet>,
+    edges: Vec<Edge<()>>,
+}
+
+impl<'c> Graph<'c> {
+    fn of(found: &'c CallEdges, symbols: &Symbols) -> Self {
+        let nodes = Nodes { units: found.ends.len() as u32, calls: found.calls.len() as u32 };
+        let count = nodes.iteration(found.iterations.len() as u32) as usize;
+        let last = vec![MotionSet::default(); count];
+        Self { found, nodes, passes: found.passing(symbols), last, edges: Vec::new() }
+    }
+
+    /// What may be last according to a set of a unit.
+    fn sources(&self, unit: u32, reaching: &ReachingMotions) -> Vec<Source> {
+        let mut out = Vec::new();
+        for &known in reaching.known() {
+            match known {
+                Last::Motion(motion) => out.push(Source::Motion(motion)),
+                Last::Iteration(at) => out.push(Source::Node(self.nodes.iteration(at))),
+                Last::Call(call) => {
+                    let callee = self.found.calls[call as usize].callee;
+                    out.push(Source::Node(self.nodes.end(callee)));
+                    if self.passes[callee as usize] {
+                        out.push(Source::Node(self.nodes.before(call)));
+                    }
+                }
+            }
+        }
+        if reaching.anywhere {
+            out.push(Source::Node(self.nodes.anywhere(unit)));
+        }
+        if reaching.entry {
+            out.push(Source::Node(self.nodes.entry(unit)));
+        }
+        out
+    }
+
+    fn flows_into(&mut self, node: u32, unit: u32, reaching: &ReachingMotions) {
+        if reaching.elsewhere {
+            self.last[node as usize].0.push(ELSEWHERE);
+        }
+        for source in self.sources(unit, reaching) {
+            match source {
+                Source::Motion(motion) => self.last[node as usize].0.push(motion),
+                Source::Node(from) => self.edges.push((from, node, ())),
+            }
+        }
+    }
+
+    /// The entries of units that no call enters: the program's start, its next cycle, interrupts.
+    fn add_elsewhere(&mut self, symbols: &Symbols, mains: &[u32]) {
+        let mut is_called = vec![false; self.found.ends.len()];
+        self.found.calls.iter().for_each(|call| is_called[call.callee as usize] = true);
+        for (list, routines) in symbols.late_lists.iter().enumerate() {
+            if is_called[symbols.units.len() + list] {
+                routines.iter().for_each(|routine| is_called[symbols.unit_of(*routine) as usize] = true);
+            }
+        }
+        for (unit, is_called) in (0..).zip(&is_called) {
+            let is_entered = |unit: &Unit| {
+                let starts = |routine: u32| mains.contains(&routine) || symbols.interrupts[routine as usize];
+                unit.routine.is_some_and(starts)
+            };
+            if !is_called || symbols.units.get(unit as usize).is_some_and(is_entered) {
+                self.last[self.nodes.entry(unit) as usize].0.push(ELSEWHERE);
+            }
+        }
+    }
+
+    /// What flows to the ends of units, into calls, and around loops.
+    fn add_flows(&mut self) {
+        let found = self.found;
+        for (unit, end) in (0..).zip(&found.ends) {
+            // What was last before the routine is the caller's to know.
+            self.flows_into(self.nodes.end(unit), unit, &end.within_routine());
+        }
+        for (call, at) in (0..).zip(&found.calls) {
+            self.flows_into(self.nodes.entry(at.callee), at.caller, &at.before);
+            if self.passes[at.callee as usize] {
+                self.flows_into(self.nodes.before(call), at.caller, &at.before);
+            }
+        }
+        for (at, (unit, end)) in (0..).zip(&found.iterations) {
+            self.flows_into(self.nodes.iteration(at), *unit, end);
+        }
+    }
+
+    /// A call by a computed name enters each routine of its list.
+    fn add_late_lists(&mut self, symbols: &Symbols) {
+        for (list, routines) in (symbols.units.len() as u32..).zip(&symbols.late_lists) {
+            for unit in routines.iter().map(|routine| symbols.unit_of(*routine)) {
+                self.edges.push((self.nodes.end(unit), self.nodes.end(list), ()));
+                self.edges.push((self.nodes.entry(list), self.nodes.entry(unit), ()));
+            }
+        }
+    }
+
+    /// All motions of each unit, if any set asks for them.
+    fn add_anywhere(&mut self, units: &[u32]) {
+        let found = self.found;
+        let befores = found.calls.iter().map(|call| &call.before);
+        let of_loops = found.iterations.iter().map(|(_, end)| end);
+        let of_arrivals = found.arrivals.iter().map(|(.., before)| before);
+        let mut all = befores.chain(of_loops).chain(of_arrivals).chain(&found.ends);
+        if !all.any(|reaching| reaching.anywhere) {
+            return;
+        }
+        for (motion, unit) in (0..).zip(units) {
+            self.last[self.nodes.anywhere(*unit) as usize].0.push(motion);
+        }
+        let nodes = &self.nodes;
+        let of_calls = found.calls.iter();
+        self.edges.extend(of_calls.map(|call| (nodes.end(call.callee), nodes.anywhere(call.caller), ())));
+        self.edges.extend((0..nodes.units).map(|unit| (nodes.entry(unit), nodes.anywhere(unit), ())));
+    }
+
+    fn solve(&mut self) {
+        self.edges.sort_unstable();
+        self.edges.dedup();
+        self.last.iter_mut().for_each(MotionSet::normalise);
+        let height = self.last.iter().map(|motions| motions.0.len()).sum();
+        propagate(&mut self.last, height, &mut self.edges, |(), motions| motions.clone());
+    }
+
+    /// See [`CallEdges::solve`].
+    fn collect(&self) -> (Vec<[u32; 2]>, BTreeMap<u32, Vec<u32>>) {
+        let mut out = Vec::new();
+        let mut predecessors = BTreeMap::new();
+        for ((unit, motion, before), branched) in self.found.arrivals.iter().zip(&self.found.branched) {
+            let mut all = MotionSet::default();
+            for source in self.sources(*unit, before) {
+                match source {
+                    Source::Motion(motion) => all.0.push(motion),
+                    Source::Node(node) => {
+                        let last = &self.last[node as usize].0;
+                        let known = last.iter().filter(|before| **before != ELSEWHERE);
+                        out.extend(known.map(|before| [*before, *motion]));
+                        if *branched && all.0.len() <= MOST_PREDECESSORS {
+                            all.0.extend(last);
+                        }
+                    }
+                }
+            }
+            all.normalise();
+            if *branched && !all.0.contains(&ELSEWHERE) && (1..=MOST_PREDECESSORS).contains(&all.0.len()) {
+                predecessors.insert(*motion, all.0);
+            }
+        }
+        if self.found.calls.is_empty() {
+            return (Vec::new(), predecessors);
+        }
+        out.sort_unstable();
+        out.dedup();
+        (out, predecessors)
     }
 }

@@ -389,7 +389,7 @@ fn unmodified_motions_keep_their_end_points() {
     let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
     let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
     assert!(String::from_utf8_lossy(&text).contains("A180.12346 "), "{}", String::from_utf8_lossy(&text));
-    assert_eq!(Reason::BeforeUnmodifiedArc.text(), "an unmodified arc starts at the end of this motion");
+    assert_eq!(Reason::BeforeUnmodifiedArc.text(), "an uncorrected arc starts at the end of this motion");
 }
 
 /// The class: a modal word in a block that is left before its words are interpreted. Its value is unknown afterwards.

@@ -50,7 +50,7 @@ fn calls_of_programs_outside_the_file_are_listed() {
     let outside = |name: &str, body: &str| -> Vec<u32> {
         let task = Task::read(&[(name, body.as_bytes())], &Setup::default());
         let motions = &task.listing.motions;
-        task.listing.external_calls.iter().map(|&call| motions[call as usize].place.line).collect()
+        task.listing.nc.external_calls.iter().map(|&call| motions[call as usize].place.line).collect()
     };
     let go = "G1 X1. Y2. Z3. A180. B0. C0. F600.";
     let fanuc = format!("O1\nM98 P2\nM98 P30002\nM98 P9\nG65 P9010 A1.\n{go}\nM30\nO2\nX5.\nM99\n");

@@ -6,9 +6,9 @@ use crate::placement::{self, BeforeAndAfter};
 use crate::status::Status;
 use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_compensation::deviation::Status as MotionStatus;
-use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::steps_to_left::is_path;
+use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Motion, Reason};
 
 /// All statuses in display order.
@@ -17,142 +17,163 @@ const STATUSES: [MotionStatus; 4] =
 
 /// Verdict on a compensation, the same on the terminal, on the page and in the exit code. `is_written`: the corrected program is.
 pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
-    let (refused, flagged) = (count(plan, MotionStatus::Refused), count(plan, MotionStatus::Flagged));
-    let written = count(plan, MotionStatus::Changed) + flagged;
-    let (left, cuts) = placement::left_at_risk(plan);
-    let same = !plan.outcomes.is_empty()
-        && plan.outcomes.iter().all(|o| o.reason() == Some(OutcomeReason::NoChange));
-    let (status, headline) = match (written, refused + flagged) {
-        (0, 0) if same => {
-            (Status::NotEvaluated, "Nothing to correct: every number is already right to its last decimal")
-        }
-        (0, 0) if left > 0 => {
-            (Status::NotEvaluated, "Nothing was corrected: the model is too uncertain where the program cuts")
-        }
-        (0, 0) => (Status::NotEvaluated, "Nothing was corrected"),
-        (0, _) => (Status::Bad, "Nothing could be corrected"),
-        _ if no_cut(plan, listing) => (
-            Status::Warning,
-            "No cut is corrected, only motions between cuts: the deviation of the workpiece stays",
+    let (status, headline) = headline(plan, listing, is_written);
+    Verdict::new(status, headline, reasons(plan, listing))
+}
+
+/// The first that holds.
+fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'static str) {
+    let to_check = count(plan, MotionStatus::Refused) + count(plan, MotionStatus::Flagged) > 0;
+    let is_right = |outcome: &MotionOutcome| outcome.reason() == Some(OutcomeReason::NoChange);
+    let (at_risk, _) = placement::left_at_risk(plan);
+    if written(plan) == 0 {
+        return match to_check {
+            true => (Status::Bad, "Nothing could be corrected"),
+            false if !plan.outcomes.is_empty() && plan.outcomes.iter().all(is_right) => (
+                Status::NotEvaluated,
+                "Nothing to correct: every number is already right to its last decimal",
+            ),
+            false if at_risk > 0 => (
+                Status::NotEvaluated,
+                "Nothing was corrected: the model is too uncertain where the program cuts",
+            ),
+            false => (Status::NotEvaluated, "Nothing was corrected"),
+        };
+    }
+    let warnings = [
+        (
+            no_cut(plan, listing),
+            "No cut was corrected, only moves between cuts: the workpiece deviates as before",
         ),
-        _ if is_again(listing) => (
-            Status::Warning,
-            "Corrected once more: the corrections add up, and what deviates now is not known from this program",
+        (
+            is_again(listing),
+            "Corrected a second time: both corrections add up, so the remaining deviation cannot be stated",
         ),
-        (_, 0) if left > 0 => (
-            Status::Warning,
-            "Corrected, except for cuts where the model is too uncertain: these are unchanged",
-        ),
-        (_, 0) if !listing.opaque.is_empty() => (
-            Status::Warning,
+        (to_check, "Corrected, but check the refused and flagged motions before running the program"),
+        (at_risk > 0, "Corrected, except for cuts where the model is too uncertain: these are unchanged"),
+        (
+            !listing.opaque.is_empty(),
             "Corrected, but parts of the program could not be read: check them before running the program",
         ),
-        (_, 0) if plan.steps.is_some() => (
-            Status::Warning,
-            "Corrected, but the path has steps beside motions that are left: check them before running the program",
+        (
+            plan.steps.is_some(),
+            "Corrected, but the path steps next to uncorrected motions: check them before running the program",
         ),
-        (_, 0) if !listing.open_controls.is_empty() => (
-            Status::Warning,
-            "Corrected for a control that is not stated: state it before running the program",
+        (
+            !listing.nc.open_controls.is_empty(),
+            "Corrected, but nothing says which control the program is for: state it before running the program",
         ),
-        (_, 0) if !plan.unstated_axes.is_empty() => (
-            Status::Warning,
-            "Corrected for a robot that stands still: state what the external axes carry before running the program",
+        (
+            !plan.unstated_axes.is_empty(),
+            "Corrected as if the robot base never moves: state what the external axes carry before running the program",
         ),
-        (_, 0) if plan.unknown_loads > 0 => (
-            Status::Warning,
-            "Corrected for the tool alone where the load is known only at run time (GripLoad): check it before running the program",
+        (
+            plan.unknown_loads > 0,
+            "Corrected, but where GripLoad sets the load at run time only the tool is counted: check these motions before running the program",
         ),
-        (_, 0) if paths(plan, listing)[2] > 0 => (
-            Status::Warning,
-            "Corrected, except for lines or arcs that are left: there the workpiece deviates as before",
+        (
+            paths(plan, listing)[2] > 0,
+            "Corrected, except for some lines or arcs, where the workpiece deviates as before",
         ),
-        (_, 0) if left_cycles(listing) > 0 => (
-            Status::Warning,
-            "Corrected, except for canned cycles: their holes and pockets stay where they are, beside corrected paths",
+        (
+            left_cycles(listing) > 0,
+            "Corrected, except for canned cycles: their holes and pockets keep their old error next to corrected paths",
         ),
-        (_, 0) if !is_written => {
-            (Status::Good, "All correctable motions would be corrected; nothing was written")
-        }
-        (_, 0) => (Status::Good, "All correctable motions are corrected: the program may run"),
-        _ => (
-            Status::Warning,
-            "Corrected, but check the refused and flagged motions before running the program",
-        ),
-    };
+    ];
+    match warnings.into_iter().find(|(holds, _)| *holds) {
+        Some((_, headline)) => (Status::Warning, headline),
+        None if is_written => (Status::Good, "All correctable motions are corrected: the program may run"),
+        None => (Status::Good, "All correctable motions would be corrected; nothing was written"),
+    }
+}
+
+/// Everything that the headline rests on, the figures first.
+fn reasons(plan: &Plan, listing: &Listing) -> Vec<String> {
+    let is_any_written = written(plan) > 0;
     let mut reasons = deviations(plan, listing);
     reasons.push(coverage(plan));
-    reasons.extend(left_paths(plan, listing).filter(|_| written > 0));
-    reasons.extend(match left_cycles(listing) {
-        1.. if written == 0 => None,
-        0 => None,
-        1 => Some("1 canned cycle is left: its motions are not in the program".to_owned()),
-        count => Some(format!("{count} canned cycles are left: their motions are not in the program")),
-    });
-    if left > 0 {
-        reasons.push(format!(
-            "{left} of {cuts} cuts are unchanged, since their correction makes them worse with a probability above --max-risk; measuring \
-             more poses near them improves the model (`truegrind plan`)"
-        ));
-    }
+    reasons.extend(left_paths(plan, listing).filter(|_| is_any_written));
+    reasons.extend(left_cycles_reason(listing).filter(|_| is_any_written));
+    reasons.extend(at_risk_reason(plan));
     reasons.extend(placement::risk(plan).filter(|_| !is_again(listing)));
-    if refused > 0 && written > 0 {
+    if is_any_written && count(plan, MotionStatus::Refused) > 0 {
         reasons.push(
-            "refused motions are unchanged: the path has a step of the size of the correction between them and their corrected neighbours"
+            "refused motions are not corrected: between them and their corrected neighbours the path steps by the size of the correction"
                 .to_owned(),
         );
     }
     reasons.extend(plan.steps.as_ref().map(|steps| steps.sentence(listing)));
-    let steps = count_reason(plan, |reason| {
+    reasons.extend(cuts_reason(plan));
+    reasons.extend(opaque_reason(listing));
+    reasons.extend(inserted_reason(plan));
+    reasons
+}
+
+fn left_cycles_reason(listing: &Listing) -> Option<String> {
+    match left_cycles(listing) {
+        0 => None,
+        1 => Some("1 canned cycle is not corrected: its motions are not in the program".to_owned()),
+        count => {
+            Some(format!("{count} canned cycles are not corrected: their motions are not in the program"))
+        }
+    }
+}
+
+fn at_risk_reason(plan: &Plan) -> Option<String> {
+    let (at_risk, cuts) = placement::left_at_risk(plan);
+    (at_risk > 0).then(|| {
+        format!(
+            "{at_risk} of {cuts} cuts are not corrected, since that would make them worse with a probability above --max-risk. Measure more \
+             poses near them (`truegrind plan`)"
+        )
+    })
+}
+
+/// Motions that are kept for the sake of others of their cut.
+fn cuts_reason(plan: &Plan) -> Option<String> {
+    let kept = |reason: &OutcomeReason| {
         matches!(reason, OutcomeReason::PartOfCut { .. } | OutcomeReason::Step { .. })
-    });
-    if steps > 0 {
-        let (motions, own) = if steps == 1 { ("motion is", "its") } else { ("motions are", "their") };
-        reasons.push(format!(
-            "{steps} correctable {motions} unchanged, since another motion of {own} cut cannot be corrected: correcting a part of a cut \
-             would leave a step in the workpiece"
-        ));
+    };
+    let kept = plan.outcomes.iter().filter(|outcome| outcome.reason.as_deref().is_some_and(kept)).count();
+    let (motions, own) = if kept == 1 { ("motion is", "its") } else { ("motions are", "their") };
+    (kept > 0).then(|| {
+        format!(
+            "{kept} correctable {motions} not corrected, since another motion of {own} cut cannot be: correcting a part of a cut would \
+             leave a step in the workpiece"
+        )
+    })
+}
+
+fn opaque_reason(listing: &Listing) -> Option<String> {
+    match listing.opaque.len() {
+        0 => None,
+        1 => Some("1 region could not be read and is unchanged; motions in it are not corrected".to_owned()),
+        count => Some(format!(
+            "{count} regions could not be read and are unchanged; motions in them are not corrected"
+        )),
     }
-    if !listing.opaque.is_empty() {
-        reasons.push(match listing.opaque.len() {
-            1 => "1 region could not be read and is unchanged; motions in it are not corrected".to_owned(),
-            count => {
-                format!(
-                    "{count} regions could not be read and are unchanged; motions in them are not corrected"
-                )
-            }
-        });
-    }
+}
+
+fn inserted_reason(plan: &Plan) -> Option<String> {
     let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted as usize).sum();
-    if inserted > 0 {
-        reasons.push(format!(
-            "{inserted} {} inserted, to keep the path within the tolerance between targets",
-            if inserted == 1 { "target" } else { "targets" }
-        ));
-    }
-    Verdict::new(status, headline, reasons)
+    let targets = if inserted == 1 { "target" } else { "targets" };
+    (inserted > 0).then(|| {
+        format!("{inserted} {targets} inserted, to keep the path within the tolerance between targets")
+    })
 }
 
-fn count_reason(plan: &Plan, is: impl Fn(&OutcomeReason) -> bool) -> usize {
-    plan.outcomes.iter().filter(|outcome| outcome.reason.as_deref().is_some_and(&is)).count()
-}
-
-/// Lines and arcs on which the tool may cut: how many, how many of them are right or corrected, and how many are left.
+/// Lines and arcs on which the tool may cut: how many, how many of them are right or corrected, and how many are uncorrected.
 fn paths(plan: &Plan, listing: &Listing) -> [usize; 3] {
     let mut found = [0; 3];
     for outcome in &plan.outcomes {
         if is_path(&listing.motions[outcome.motion as usize]) {
             let right = outcome.reason() == Some(OutcomeReason::NoChange);
             found[0] += 1;
-            found[1] += usize::from(right || is_written(outcome.status));
+            found[1] += usize::from(right || outcome.status.is_written());
             found[2] += usize::from(!right && outcome.status == MotionStatus::Left);
         }
     }
     found
-}
-
-fn is_written(status: MotionStatus) -> bool {
-    matches!(status, MotionStatus::Changed | MotionStatus::Flagged)
 }
 
 /// Whether the program has cuts and all of them are unchanged.
@@ -161,16 +182,12 @@ fn no_cut(plan: &Plan, listing: &Listing) -> bool {
     all > 0 && corrected == 0 || !plan.cuts.is_empty() && plan.cuts.iter().all(|cut| !cut.corrected)
 }
 
-/// What is said of lines and arcs that are left beside corrected motions; `None` without any.
+/// Sentence on uncorrected lines and arcs; `None` without any.
 fn left_paths(plan: &Plan, listing: &Listing) -> Option<String> {
     match paths(plan, listing) {
         [_, _, 0] => None,
-        [_, _, 1] => {
-            Some("1 line or arc on which the tool may cut is left: there the deviation stays".to_owned())
-        }
-        [_, _, left] => Some(format!(
-            "{left} lines or arcs on which the tool may cut are left: there the deviation stays"
-        )),
+        [_, _, 1] => Some("1 line or arc on which the tool may cut is not corrected".to_owned()),
+        [_, _, left] => Some(format!("{left} lines or arcs on which the tool may cut are not corrected")),
     }
 }
 
@@ -192,8 +209,7 @@ fn is_again(listing: &Listing) -> bool {
 fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
     if is_again(listing) {
         return vec![
-            "the program was corrected before (mark in the file): its numbers are not those that were intended, so deviations before and \
-             after and the risk cannot be stated; correct the original program instead"
+            "this program was already corrected (its mark says so), so deviation and risk cannot be stated; correct the original program instead"
                 .to_owned(),
         ];
     }
@@ -202,8 +218,8 @@ fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
         let unknown = plan.outcomes.iter().filter(|outcome| outcome.before_mm.get().is_none()).count();
         let where_known = match unknown {
             0 => String::new(),
-            1 => " where it is known (not at 1 motion)".to_owned(),
-            _ => format!(" where it is known (not at {unknown} motions)"),
+            1 => "; unknown at 1 motion".to_owned(),
+            _ => format!("; unknown at {unknown} motions"),
         };
         let uncorrected =
             |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm{where_known}");
@@ -283,7 +299,7 @@ pub fn coverage(plan: &Plan) -> String {
         format!("{found} {} ({})", status_word(status), share(found, all))
     };
     let flagged = count(plan, MotionStatus::Flagged);
-    let written = count(plan, MotionStatus::Changed) + flagged;
+    let written = written(plan);
     let of_which = match flagged {
         0 => String::new(),
         1 => ", of which 1 is flagged".to_owned(),
@@ -310,6 +326,11 @@ fn share(part: usize, all: usize) -> String {
     } else {
         format!("{percent:.1} %")
     }
+}
+
+/// How many motions are rewritten.
+fn written(plan: &Plan) -> usize {
+    plan.outcomes.iter().filter(|outcome| outcome.status.is_written()).count()
 }
 
 fn count(plan: &Plan, motion_status: MotionStatus) -> usize {

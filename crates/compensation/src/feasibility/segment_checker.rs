@@ -1,18 +1,6 @@
-//! Effect of a correction near a singularity, and which solution the controller selects there.
+//! The segments between the targets of a program: near a singularity, at the limits of joints, and where the configuration is open.
 //!
-//! Method. Far from singularities a correction of 1 mm moves each joint by about 1 mm over half an arm's length; at distance
-//! d from a singularity, by 1/d times that or more. A correction is written only where no joint changes by more than
-//! [`Options::joint_gain`] times its size, and nowhere closer to a singularity than [`Options::min_singularity`]: at the
-//! target before and after, and at samples of lines and arcs. Branch margins are 0 at the singularities and change by at most
-//! about [`MARGIN_RATE`] per flange travel (half arm lengths and rad); a piece of a segment with larger margins at its ends
-//! cannot come near one and is not sampled further.
-//!
-//! On the same samples joints must stay within their limits ([`joint_limits`]): between targets within the limits a corrected
-//! segment can exceed one that the original segment just kept.
-//!
-//! The written configuration is read again as the controller reads it. With its sign, cfx identifies one solution; where the
-//! text states another cfx (some arms do not use it), the written numbers are solved again. Where no configuration applies,
-//! lines stay on their branch, and a joint motion goes to the solution nearest to its start.
+//! Where no configuration applies, lines stay on their branch, and a joint motion goes to the solution nearest to its start.
 //! Checked against: an independent controller in the tests, with all branches by Newton's method from spread seeds.
 
 use std::cell::Cell;
@@ -20,139 +8,28 @@ use std::collections::{BTreeMap, HashSet};
 
 use rayon::prelude::*;
 
+use super::joint_jump::{flange_travel, travel_bound};
+use super::path_check::{PathCheck, clear, curve_travel, margins};
 use crate::arms::Arms;
-use crate::configuration::{configured, monitored};
+use crate::configuration::monitored;
 use crate::feasibility::joint_limits;
-use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Emit, Options, is_rewritable};
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget;
 use crate::segment::curve::Curve;
 use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
+use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
-use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::Joints;
-use truegrind_math::se3::{Pose, angle_bound_rad};
-use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, RobTarget, Switch, TargetValue};
-
-/// Largest rate of change of a margin with flange travel: the sine of the wrist angle changes with the rotation of the tool
-/// and with the rotation of the forearm by joints 2 and 3.
-const MARGIN_RATE: f64 = 3.0;
-
-/// Margins of shoulder, elbow and wrist beyond which joints move at most a few times as far as elsewhere.
-const CLEAR_MARGIN: [f64; 3] = [0.05, 0.12, 0.15];
-
-/// Shortest piece of a segment (half arm lengths and rad), together with [`FINEST_SHARE`] of its smallest margin.
-const FINEST: f64 = 3e-4;
-/// See [`FINEST`]: the joints sweep within about the margin itself.
-const FINEST_SHARE: f64 = 0.2;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, Switch, TargetValue};
 
 /// Most samples of one segment.
 const MOST_SAMPLES: usize = 400;
 
 /// Margin below which an unknown start decides between two branches.
 const BORDER_MARGIN: f64 = 0.05;
-
-/// Largest difference between the joints that the controller computes from written numbers and the intended ones (rad).
-const SAME_RAD: f64 = 1e-6;
-
-/// The singularity distance before the correction is computed where that after is below so many times the bound.
-const SINGULARITY_WATCH: f64 = 20.0;
-
-/// What the controller computes from the numbers of one target.
-pub(crate) struct WrittenTarget<'a> {
-    /// Its frames, as the controller holds them.
-    pub(crate) frames: &'a FramePair,
-    /// Flange pose that the controller computes.
-    pub(crate) flange: &'a Pose,
-    /// The same from the numbers as written.
-    pub(crate) read_back: &'a Pose,
-    /// Its joints for them.
-    pub(crate) joints: &'a Joints,
-    /// The target, where its configuration applies.
-    pub(crate) stated: Option<&'a RobTarget>,
-}
-
-/// Why a target must not be corrected, because of its joint motion or because the controller selects other joints.
-/// `singularity`: singularity distance of the corrected joints.
-pub(crate) fn target_fault(
-    solved: &SolvedTarget<'_>,
-    singularity: f64,
-    replay: &WrittenTarget<'_>,
-    arms: &Arms<'_>,
-    options: &Options,
-) -> Option<OutcomeReason> {
-    let flanges = || [replay.frames.flange_for(&solved.intended.pose()), *replay.flange];
-    let joints = [&solved.before, replay.joints];
-    if let Some(joint_jump) = joint_jump(flanges, joints, &arms.nominal, options) {
-        return Some(joint_jump);
-    }
-    if singularity < SINGULARITY_WATCH * options.min_singularity
-        && arms.nominal.singularity(&solved.before) < options.min_singularity
-    {
-        return Some(OutcomeReason::NearSingularity);
-    }
-    let stated = replay.stated.filter(|stated| stated.conf[3] != solved.conf.cfx)?;
-    // The quarter turns are written, but cfx is not that of these joints, so another solution can match
-    // better.
-    let conf = [solved.conf.cf1, solved.conf.cf4, solved.conf.cf6, stated.conf[3]];
-    let written = RobTarget { conf, ..*stated };
-    let taken = configured(&arms.nominal, replay.read_back, &written, Switch::On, Some(replay.joints));
-    let same = taken.is_ok_and(|taken| (taken - replay.joints).amax() < SAME_RAD);
-    (!same).then_some(OutcomeReason::OtherBranch)
-}
-
-/// The joint that a correction turns too far.
-fn joint_jump(
-    flanges: impl FnOnce() -> [Pose; 2],
-    joints: [&Joints; 2],
-    nominal: &Inverse<'_>,
-    options: &Options,
-) -> Option<OutcomeReason> {
-    let change = joints[1] - joints[0];
-    let joint = change.iamax();
-    let turned = change[joint].abs();
-    if turned <= options.free_joint_change_rad {
-        return None;
-    }
-    let [from, to] = flanges();
-    let most = (options.joint_gain * flange_travel(&from, &to, nominal)).max(options.free_joint_change_rad);
-    (!(turned <= most)).then(|| OutcomeReason::JointJump {
-        joint: joint as u8,
-        deg: turned.to_degrees(),
-        most_deg: most.to_degrees(),
-        on_the_way: false,
-    })
-}
-
-/// Whether an inserted target turns a joint too far relative to the original program. `intended` and `commanded`: poses in
-/// the work object.
-pub(crate) fn jumps_joint(
-    [intended, commanded]: [&Pose; 2],
-    joints: &Joints,
-    mounting: &FramePair,
-    arms: &Arms<'_>,
-    options: &Options,
-) -> bool {
-    let [intended, commanded] = [intended, commanded].map(|pose| mounting.flange_for(pose));
-    let before = arms.nominal.solve_near(&intended, joints);
-    before.is_ok_and(|before| {
-        joint_jump(|| [intended, commanded], [&before.joints, joints], &arms.nominal, options).is_some()
-    })
-}
-
-/// Distance of two flange poses: displacement over half an arm's length, plus rotation (rad).
-fn flange_travel(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
-    let shift = (to.translation.vector - from.translation.vector).norm();
-    shift / nominal.length_mm() + from.rotation.angle_to(&to.rotation)
-}
-
-/// An upper bound of [`flange_travel`].
-fn travel_bound(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
-    let shift = (to.translation.vector - from.translation.vector).norm();
-    shift / nominal.length_mm() + angle_bound_rad(&from.rotation, &to.rotation)
-}
 
 /// Forbids motions whose segment or start does not allow their correction; returns whether any was.
 ///
@@ -168,13 +45,13 @@ pub(crate) fn forbid_segments(
     budget: &mut SearchBudget,
 ) -> bool {
     let none = BTreeMap::new();
-    let mut ways =
+    let mut checker =
         SegmentChecker { listing, solved, unchanged: stays.unwrap_or(&none), frame_table, arms, options };
     let found = match stays {
-        None => ways.forbid_each(),
+        None => checker.forbid_each(),
         Some(stays) => stays.keys().map(|motion| *motion as usize).collect(),
     };
-    ways.forbid_after_unchanged(&found, budget) || (stays.is_none() && !found.is_empty())
+    checker.forbid_after_unchanged(&found, budget) || (stays.is_none() && !found.is_empty())
 }
 
 /// Samples for all segments of a program: at least so many, and so many per motion.
@@ -202,14 +79,6 @@ struct SegmentStart {
     /// After.
     margins: [f64; 3],
     corrected: bool,
-}
-
-/// Ratio of a branch margin to the singularity distance.
-const WITHOUT_BRANCHES: f64 = 5.0;
-
-/// Branch margins at joints of the nominal arm; for an arm without branches, from its singularity distance.
-fn margins(branches: [f64; 3], joints: &Joints, nominal: &Inverse<'_>) -> [f64; 3] {
-    if branches == [1.0; 3] { [nominal.singularity(joints) * WITHOUT_BRANCHES; 3] } else { branches }
 }
 
 impl SegmentChecker<'_, '_> {
@@ -555,113 +424,3 @@ fn nearest_branch_rad(margins: &[f64; 3]) -> f64 {
 /// Share of that within which the start cannot be nearer to the other solution, by the largest joint change or by the sum of
 /// squares: 1/(1 + √6).
 const NEAREST_SHARE: f64 = 0.28;
-
-/// Whether a piece of a segment with these margins at its ends is clear of singularities.
-fn clear(from: &[f64; 3], to: &[f64; 3], flange_travel: f64) -> bool {
-    (0..3).all(|k| {
-        (from[k] < 0.0) == (to[k] < 0.0)
-            && from[k].abs() + to[k].abs() - MARGIN_RATE * flange_travel > 2.0 * CLEAR_MARGIN[k]
-    })
-}
-
-/// Flange travel along a curve (see [`flange_travel`]), from eight pieces.
-fn curve_travel(curve: &Curve, commanded: &FramePair, nominal: &Inverse<'_>) -> f64 {
-    const PIECES: usize = 8;
-    let at = |k: usize| commanded.flange_for(&curve.at(k as f64 / PIECES as f64));
-    (0..PIECES).map(|k| flange_travel(&at(k), &at(k + 1), nominal)).sum()
-}
-
-/// A corrected segment beside the original one.
-struct PathCheck<'a> {
-    nominal: &'a Inverse<'a>,
-    commanded: FramePair,
-    /// Original and commanded.
-    curves: [Curve; 2],
-    /// See [`curve_travel`].
-    curve_travel: f64,
-    /// Remaining samples.
-    samples: &'a Cell<usize>,
-    options: &'a Options,
-}
-
-/// Reason where a segment has no solution.
-fn unreachable_reason(error: InverseError) -> OutcomeReason {
-    match error {
-        InverseError::OutsideLimits { what, .. } => OutcomeReason::PathOutsideLimits { what },
-        _ => OutcomeReason::SingularPath,
-    }
-}
-
-/// A sample of the corrected segment.
-struct PathSample {
-    share: f64,
-    joints: Joints,
-    margins: [f64; 3],
-}
-
-impl PathCheck<'_> {
-    fn reached(&self, share: f64, joints: Joints) -> PathSample {
-        let margins = match self.nominal.has_branches() {
-            true => self.nominal.branch_margins(&joints),
-            false => [self.nominal.singularity(&joints) * WITHOUT_BRANCHES; 3],
-        };
-        PathSample { share, joints, margins }
-    }
-
-    /// Why a piece of the segment must not be executed.
-    fn check_piece(&self, a: &PathSample, b: &PathSample) -> Option<OutcomeReason> {
-        let flange_travel = (b.share - a.share) * self.curve_travel;
-        let least = a.margins.iter().chain(&b.margins).fold(f64::INFINITY, |least, m| least.min(m.abs()));
-        let crosses = (0..3).any(|k| (a.margins[k] < 0.0) != (b.margins[k] < 0.0));
-        let regular = clear(&a.margins, &b.margins, flange_travel)
-            || (!crosses && flange_travel < FINEST_SHARE * least);
-        let limits = &self.nominal.arm().model.limits;
-        let keeps = || {
-            joint_limits::within_limits(
-                limits,
-                [&a.joints, &b.joints],
-                [&a.margins, &b.margins],
-                flange_travel,
-            )
-        };
-        if flange_travel < FINEST || (regular && keeps()) || self.samples.get() == 0 {
-            return crosses.then_some(OutcomeReason::SingularPath);
-        }
-        self.samples.set(self.samples.get() - 1);
-        let middle = match self.sample_at(0.5 * (a.share + b.share), a) {
-            Ok(middle) => middle,
-            Err(why) => return why,
-        };
-        if regular && joint_limits::within_limits_curved(limits, [&a.joints, &middle.joints, &b.joints]) {
-            return None;
-        }
-        self.check_piece(a, &middle).or_else(|| self.check_piece(&middle, b))
-    }
-
-    /// A sample solved from a nearby one; otherwise the reason, if any.
-    fn sample_at(&self, share: f64, near: &PathSample) -> Result<PathSample, Option<OutcomeReason>> {
-        let [intended, flange] = [0, 1].map(|k| self.commanded.flange_for(&self.curves[k].at(share)));
-        let before = || self.nominal.solve_near(&intended, &near.joints).ok();
-        let solution = match self.nominal.solve_near(&flange, &near.joints) {
-            Ok(solution) => solution,
-            // Where the original segment has no solution either, the path deviation reports it.
-            Err(error) => return Err(before().map(|_| unreachable_reason(error))),
-        };
-        let place = self.reached(share, solution.joints);
-        if (0..3).all(|k| place.margins[k].abs() > CLEAR_MARGIN[k]) {
-            return Ok(place);
-        }
-        if self.nominal.singularity(&place.joints) < self.options.min_singularity {
-            return Err(Some(OutcomeReason::SingularPath));
-        }
-        let jumped = before().and_then(|s| {
-            joint_jump(|| [intended, flange], [&s.joints, &place.joints], self.nominal, self.options)
-        });
-        match jumped {
-            Some(OutcomeReason::JointJump { joint, deg, most_deg, .. }) => {
-                Err(Some(OutcomeReason::JointJump { joint, deg, most_deg, on_the_way: true }))
-            }
-            _ => Ok(place),
-        }
-    }
-}
