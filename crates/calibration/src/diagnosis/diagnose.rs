@@ -22,7 +22,7 @@ use super::summary::{self, Summary};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
 use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
-use crate::identification::benefit::{Benefit, benefit, widen_by_scale};
+use crate::identification::benefit::{Benefit, NoBenefit, benefit, inflation_from_errors, widen_by_scale};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{
@@ -554,23 +554,25 @@ fn estimated(
     let rows = &subject.observed.dataset;
     // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
     let plausible = &options.arm_tolerance;
-    let benefit =
-        || benefit(fitted, rows, &estimated, plausible, variance_inflation(fitted, rows, &stages[2]));
-    let beyond_noise = noise.beyond.or_scatter(scatter_mm);
-    let benefit =
-        few_poses.map_or_else(|| Ok(benefit().map(|benefit: Benefit| benefit.with(beyond_noise))), Err);
+    let benefit = match few_poses {
+        Some(few) => Err(NoBenefit::FewPoses(few.to_owned())),
+        None => {
+            let inflation = inflation_from_errors(fitted, rows, &estimated.geometry);
+            benefit(fitted, rows, &estimated, plausible, inflation)
+                .map(|benefit| benefit.with(noise.beyond.or_scatter(scatter_mm)))
+        }
+    };
     let parameters = parameter_table(fitted, nominal_arm);
-    let judged = benefit.as_ref().map(Option::as_ref).map_err(|few| *few);
     let unseen = unseen_target(handed, rows, &estimated);
-    estimated.verdict = judge(fitted, (rows.sensor, unseen), judged, &parameters, stages, options);
-    (estimated, benefit.ok().flatten())
+    estimated.verdict = judge(fitted, (rows.sensor, unseen), benefit.as_ref(), &parameters, stages, options);
+    (estimated, benefit.ok())
 }
 
-/// The verdict of an identification, plus: findings must not raise the held-out error of geometry. `benefit` says why it is not stated.
+/// The verdict of an identification, plus: findings must not raise the held-out error of geometry.
 fn judge(
     fitted: &Fitted,
     (sensor, unseen_target): (Sensor, Option<String>),
-    benefit: Result<Option<&Benefit>, &str>,
+    benefit: Result<&Benefit, &NoBenefit>,
     parameters: &[EstimatedParameter],
     stages: &[StageError; 3],
     options: &Options,
@@ -589,25 +591,10 @@ fn judge(
     }
     verdict.check_links(parameters, &options.arm_tolerance, LINK_Z);
     verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
-    match benefit {
-        Ok(benefit) => verdict.check_benefit(benefit, sensor),
-        Err(few_poses) => verdict.doubt(few_poses),
-    }
+    verdict.check_benefit(benefit, sensor);
     if let Some(unseen_target) = unseen_target {
         verdict.note(unseen_target);
     }
     verdict.check_limits(&options.limits, &stages[2].random);
     verdict.build()
-}
-
-/// Squared held-out error relative to its expectation: with k parameters determined by n readings it is (n + k) / (n − k) times that of
-/// the fit.
-fn variance_inflation(fitted: &Fitted, dataset: &Dataset, errors: &StageError) -> f64 {
-    let per = fitted.problem.rows_per_observation();
-    let n = (dataset.rows.len() * per) as f64;
-    let shares = fitted.sigmas().into_iter().zip(&fitted.priors);
-    let spent: f64 = shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum();
-    let expected = (n + spent) / (n - spent).max(0.05 * n).max(1.0);
-    let variance_inflation = (errors.random.rmse / errors.fitted.rmse).powi(2) / expected;
-    if variance_inflation.is_finite() { variance_inflation.max(1.0) } else { 1.0 }
 }

@@ -256,7 +256,7 @@ pub fn structure(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> 
     Structure { neighbours, neighbours_z, order, order_z }
 }
 
-/// Median error of the rows (mm).
+/// Median error of the rows (mm); NaN without rows.
 pub fn median_error_mm(fit: &Extended) -> f64 {
-    median(&fit.problem.errors_mm(&fit.x).iter().map(|e| e.abs()).collect::<Vec<_>>()).unwrap_or(0.0)
+    median(&fit.problem.errors_mm(&fit.x).iter().map(|e| e.abs()).collect::<Vec<_>>()).unwrap_or(f64::NAN)
 }

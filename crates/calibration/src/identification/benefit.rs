@@ -22,6 +22,7 @@
 //! models with normal priors: Bishop 2006, section 3.5.
 //! Checked against: simulated arms at fresh poses (tests, and the sweep in `benches/verdict.rs`).
 
+use std::fmt;
 use std::ops::Range;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -40,7 +41,7 @@ use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::disturbance::{Kind, Profile};
 use truegrind_arm::condition::Condition;
-use truegrind_arm::estimated::Estimated;
+use truegrind_arm::estimated::{Estimated, StageErrors};
 use truegrind_arm::jacobian::{BaseAndTool, parameter_jacobian};
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
@@ -98,6 +99,31 @@ impl Benefit {
             beyond_noise: Some(beyond_noise),
             ..self
         }
+    }
+}
+
+/// Why no benefit for programs is stated.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum NoBenefit {
+    /// The normal equations are singular.
+    Singular,
+    /// No held-out error shows by how much the fit understates its uncertainty.
+    UnknownInflation,
+    /// Of too few poses it would be the benefit of the priors; the sentence says how many are needed.
+    FewPoses(String),
+}
+
+impl fmt::Display for NoBenefit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            NoBenefit::Singular => {
+                "the benefit for programs cannot be computed: the normal equations are singular"
+            }
+            NoBenefit::UnknownInflation => {
+                "the benefit for programs cannot be computed: without a held-out error nothing shows whether the stated uncertainties are right"
+            }
+            NoBenefit::FewPoses(sentence) => sentence,
+        })
     }
 }
 
@@ -216,10 +242,22 @@ struct LinearisedReadings {
 }
 
 /// Expected benefit of the fit `fitted` to `dataset`. `tolerance` holds plausible deviations of an arm;
-/// `variance_inflation` ([`variance_inflation`]) multiplies every posterior variance.
+/// `variance_inflation` ([`inflation_from_rows`], [`inflation_from_errors`]) multiplies every posterior variance.
 ///
-/// `None` where no parameter of the arm was fitted, or a number is not finite.
+/// # Errors
+/// [`NoBenefit::Singular`] also where no parameter of the arm was fitted, or a number is not finite.
 pub fn benefit(
+    fitted: &Fitted,
+    dataset: &Dataset,
+    estimated: &Estimated,
+    tolerance: &Tolerance,
+    variance_inflation: Option<f64>,
+) -> Result<Benefit, NoBenefit> {
+    let variance_inflation = variance_inflation.ok_or(NoBenefit::UnknownInflation)?;
+    expected_benefit(fitted, dataset, estimated, tolerance, variance_inflation).ok_or(NoBenefit::Singular)
+}
+
+fn expected_benefit(
     fitted: &Fitted,
     dataset: &Dataset,
     estimated: &Estimated,
@@ -632,11 +670,15 @@ impl ScaledCholesky {
 }
 
 /// Mean square of the held-out residuals, each divided by the σ that the training fit predicts for it, and at least 1.
-/// It is 1 where the predicted uncertainty is right.
-pub fn variance_inflation(training: &Fitted, held: &Observations) -> f64 {
-    let (Some(covariance), x) = (&training.estimate.covariance, &training.estimate.x) else { return 1.0 };
-    if x.is_empty() || held.dataset.rows.is_empty() {
-        return 1.0;
+/// It is 1 where the predicted uncertainty is right, and where the fit predicts none. `None` without held-out rows or
+/// finite residuals.
+pub fn inflation_from_rows(training: &Fitted, held: &Observations) -> Option<f64> {
+    let (Some(covariance), x) = (&training.estimate.covariance, &training.estimate.x) else { return Some(1.0) };
+    if held.dataset.rows.is_empty() {
+        return None;
+    }
+    if x.is_empty() {
+        return Some(1.0);
     }
     let subsample = held.subsample();
     let held = subsample.as_ref().unwrap_or(held);
@@ -667,8 +709,23 @@ pub fn variance_inflation(training: &Fitted, held: &Observations) -> f64 {
             sum += r * r / (1.0 + slopes.column(k).dot(&known.column(k)).max(0.0));
         }
     }
-    let mean = sum / residuals.len() as f64;
-    if mean.is_finite() { mean.max(1.0) } else { 1.0 }
+    at_least_1(sum / residuals.len() as f64)
+}
+
+/// Squared held-out error relative to its expectation, and at least 1: with k parameters determined by n readings it is
+/// (n + k) / (n − k) times that of the fit. `None` where the errors do not tell.
+pub fn inflation_from_errors(fitted: &Fitted, dataset: &Dataset, errors: &StageErrors) -> Option<f64> {
+    let per = fitted.problem.rows_per_observation();
+    let n = (dataset.rows.len() * per) as f64;
+    let shares = fitted.sigmas().into_iter().zip(&fitted.priors);
+    let spent: f64 = shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum();
+    let expected = (n + spent) / (n - spent).max(0.05 * n).max(1.0);
+    at_least_1((errors.held_out.rmse / errors.fitted.rmse).powi(2) / expected)
+}
+
+/// An unknown inflation is not the least one.
+fn at_least_1(inflation: f64) -> Option<f64> {
+    inflation.is_finite().then(|| inflation.max(1.0))
 }
 
 /// Adds to the covariance of a fit what an unknown scale error of the sensor, of standard deviation `sigma`, makes of its parameters: all

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use rayon::prelude::*;
 
-use crate::identification::benefit::{Benefit, benefit, variance_inflation, widen_by_scale};
+use crate::identification::benefit::{Benefit, NoBenefit, benefit, inflation_from_rows, widen_by_scale};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
@@ -197,8 +197,9 @@ pub fn identify(
         }
     };
     let trained = fit_training_rows(&stages, &fitted_rows, &held_rows).map_err(wrong_arm)?;
+    // A method as printed has no priors, of which a benefit is made.
     let variance_inflation =
-        (!options.solver.as_printed).then(|| variance_inflation(&trained.training, &held_rows));
+        (!options.solver.as_printed).then(|| inflation_from_rows(&trained.training, &held_rows));
     drop((fitted_rows, held_rows));
     // The final model, from all rows.
     report_step("fitting all rows");
@@ -233,17 +234,16 @@ pub fn identify(
     let beyond_noise = BeyondNoise::of(&trained.geometry, observed.dataset.sensor, repeats.as_ref())
         .beside_rounding(estimated.noise_floor_mm, observed.dataset.sensor);
     estimated.beyond_noise_mm = beyond_noise.known_mm();
-    let benefit = variance_inflation
-        .and_then(|variance_inflation| {
-            benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
-        })
-        .map(|benefit| benefit.with(beyond_noise));
+    let benefit = variance_inflation.map(|variance_inflation| {
+        benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
+            .map(|benefit| benefit.with(beyond_noise))
+    });
     let case = VerdictInputs {
         trained: &trained,
         geometry: &geometry,
         parameters: &parameters,
         outliers: &outliers,
-        benefit: benefit.as_ref(),
+        benefit: benefit.as_ref().map(Result::as_ref),
         sensor: dataset.sensor,
         still: still_joints(&estimated.region),
         set_up_anew: set_up_anew(&observed.dataset, &geometry),
@@ -252,7 +252,7 @@ pub fn identify(
     estimated.verdict = judge(&case, options);
     Ok(Identification {
         estimated,
-        benefit,
+        benefit: benefit.and_then(Result::ok),
         geometry,
         registered,
         training: trained.training,
@@ -619,7 +619,8 @@ struct VerdictInputs<'a> {
     geometry: &'a Fitted,
     parameters: &'a [EstimatedParameter],
     outliers: &'a Outliers,
-    benefit: Option<&'a Benefit>,
+    /// Absent for a method as printed.
+    benefit: Option<Result<&'a Benefit, &'a NoBenefit>>,
     sensor: Sensor,
     /// Joints that hardly moved (from 1).
     still: Vec<usize>,
@@ -686,8 +687,8 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     }
     let (before, held) = (case.trained.registered.held_out.rmse, case.trained.geometry.held_out.rmse);
     verdict.check_held_out(before, held);
-    if !options.solver.as_printed {
-        verdict.check_benefit(case.benefit, case.sensor);
+    if let Some(benefit) = case.benefit {
+        verdict.check_benefit(benefit, case.sensor);
     }
     let limits = Limits { rmse_mm: options.limit_rmse_mm, max_mm: options.limit_max_mm };
     verdict.check_limits(&limits, &case.trained.geometry.held_out);

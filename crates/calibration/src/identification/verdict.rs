@@ -5,7 +5,7 @@
 //! explains the readings as well as the links, or there are too few rows for their noise. A doubtful model is written only on
 //! request, and every use of it says so.
 
-use crate::identification::benefit::{Benefit, LawError, ScaleError};
+use crate::identification::benefit::{Benefit, LawError, NoBenefit, ScaleError};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::sensor_laws::SensorLaw;
 use crate::identification::tolerance::Tolerance;
@@ -99,9 +99,11 @@ impl VerdictBuilder {
         ));
     }
 
-    /// Fails if the held-out error increased (RMSE in mm).
+    /// Fails if the held-out error increased or is unknown (RMSE in mm).
     pub fn check_held_out(&mut self, registered_mm: f64, model_mm: f64) {
-        if model_mm > registered_mm {
+        if registered_mm.is_nan() || model_mm.is_nan() {
+            self.fail("the held-out error is unknown: no row was held out, or an error is not a number");
+        } else if model_mm > registered_mm {
             self.fail(format!(
                 "on held-out rows the estimated geometry is worse than registered frames alone: {model_mm:.3} against \
                  {registered_mm:.3} mm RMSE"
@@ -128,10 +130,13 @@ impl VerdictBuilder {
     }
 
     /// Adds doubts if the benefit is uncertain, with the reason.
-    pub fn check_benefit(&mut self, benefit: Option<&Benefit>, sensor: Sensor) {
-        let Some(found) = benefit else {
-            self.doubt("the benefit for programs cannot be computed: the normal equations are singular");
-            return;
+    pub fn check_benefit(&mut self, benefit: Result<&Benefit, &NoBenefit>, sensor: Sensor) {
+        let found = match benefit {
+            Ok(found) => found,
+            Err(why) => {
+                self.doubt(why.to_string());
+                return;
+            }
         };
         let sentence = benefit_sentence(found);
         if found.probability >= MIN_PROBABILITY {
