@@ -145,7 +145,7 @@ fn key_figures(found: &Diagnosed) -> Vec<KeyFigure> {
             fits.geometric.cv_regions_rmse_mm
         )),
         KeyFigure::new("Noise floor", diagnosis.noise_floor_mm, 3, "mm")
-            .note(diagnosis.noise_floor_source.clone()),
+            .note(diagnosis.noise_floor_source.to_string()),
     ]);
     figures
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 
 use super::table::{Column, Table};
-use truegrind_calibration::identification::verdict::percent_of;
+use truegrind_calibration::identification::verdict::{LEAST_PERCENT, MOST_PERCENT, percent_of};
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::cut_risk::CutRisk;
@@ -237,11 +237,15 @@ pub fn risk(plan: &Plan) -> Option<String> {
         plan.cuts.iter().filter(|cut| cut.corrected).map(|cut| cut.probability_of_harm).fold(0.0, f64::max);
     Some(format!(
         "probability that the corrected cuts together deviate more than the uncorrected ones: {all}; for any single cut: {}",
-        match percent_of(largest) {
-            small if small.starts_with("under") => small,
-            other => format!("at most {other}"),
-        }
+        at_most(largest)
     ))
+}
+
+/// "At most 3.0 %", or the bound that [`percent_of`] states.
+fn at_most(probability: f64) -> String {
+    let bounds = LEAST_PERCENT..=MOST_PERCENT;
+    let percent = percent_of(probability);
+    if bounds.contains(&(100.0 * probability)) { format!("at most {percent}") } else { percent }
 }
 
 fn remedy_json(remedy: &Remedy, what: &str) -> Value {

@@ -7,6 +7,7 @@ use super::number::handy;
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
+use truegrind_calibration::tracking::alarm::Mount;
 use truegrind_calibration::tracking::state::ConsumedFile;
 use truegrind_calibration::tracking::{Alarm, Departure, Tracker};
 use truegrind_math::statistics::median;
@@ -190,13 +191,13 @@ fn turn_sentence(now: &Departure) -> Option<String> {
 
 /// What readings cannot tell of the new changes, and what to measure.
 fn which_moved(alarms: &[Alarm]) -> Vec<String> {
-    let any = |name: &str| alarms.iter().any(|alarm| alarm.parameter == name);
-    let target = any("the touched point").then(|| {
+    let any = |mount: Mount| alarms.iter().any(|alarm| alarm.is_of(mount));
+    let target = any(Mount::Target).then(|| {
         "the touched point: the arm in the model for programs stays as it was. A changed last link or a lost zero of joint 6 would move the \
          readings alike; if the reflector was neither exchanged nor bumped, check the mark of joint 6, and touch a known point with the tool"
             .to_owned()
     });
-    let sensor = any("the sensor against the arm's base").then(|| {
+    let sensor = any(Mount::Sensor).then(|| {
         "sensor or base: the readings tell only that one moved against the other. Read three points fixed to the floor: if they moved for the \
          sensor, it was the sensor, and the programs are right; if not, it was the base, and programs on parts beside the arm are off"
             .to_owned()

@@ -3,7 +3,7 @@
 
 use super::cause_kind::CauseKind;
 use super::extension::{Extended, Freedom, Subject, fit};
-use super::finding::{Confidence, Finding, FoundParameter, Gain, ROUNDING_ALONE};
+use super::finding::{Confidence, Finding, FoundParameter, Gain, NoiseFloorSource};
 use super::preparation::Prepared;
 use super::selection::BLOCKS;
 use super::validation::{StageError, Validation};
@@ -228,16 +228,14 @@ pub(super) fn noise_floor(
     repeated: &Option<split::NoiseFloor>,
     subject: &Subject<'_>,
     extended: &Extended,
-) -> (Option<f64>, String) {
+) -> (Option<f64>, NoiseFloorSource) {
     if let Some(floor) = repeated {
-        return (
-            Some(floor.sigma_mm),
-            format!("{} repeated poses, {} degrees of freedom", floor.poses, floor.freedom),
-        );
+        let source = NoiseFloorSource::Repeats { poses: floor.poses, freedom: floor.freedom };
+        return (Some(floor.sigma_mm), source);
     }
     let Observations { dataset, angles } = subject.observed;
     match rounding_floor_mm(dataset, &extended.model, &extended.frames, angles) {
-        Some(floor) => (Some(floor), ROUNDING_ALONE.to_owned()),
-        None => (None, "too few poses were repeated and nothing is rounded".to_owned()),
+        Some(floor) => (Some(floor), NoiseFloorSource::RoundingAlone),
+        None => (None, NoiseFloorSource::Unknown),
     }
 }

@@ -87,7 +87,7 @@ impl FindingBuilder<'_> {
                 self.extended.causes[first].affects_same_quantity(cause)
             });
             if let Some(place) = existing {
-                findings[place].cause = format!("{}; {}", findings[place].cause, finding.cause);
+                findings[place].add_term(finding.cause);
                 findings[place].parameters.extend(finding.parameters);
                 places.push(place);
                 continue;
@@ -112,7 +112,7 @@ impl FindingBuilder<'_> {
         };
         let causes: Vec<&Cause> = indices.map(|index| &self.extended.causes[index]).collect();
         if let Some(stretches) = along_turn(self.subject, joint - 1, &causes) {
-            finding.cause = format!("{}; {}", finding.cause, in_words(stretches));
+            finding.add_term(in_words(stretches));
         }
     }
 
@@ -135,7 +135,7 @@ impl FindingBuilder<'_> {
         }
         let moved = (!drifts.is_empty()).then(|| drift::describe(&drifts, dataset, &self.extended.frames));
         let grown = (!growth.is_empty()).then(|| drift::describe_growth(&growth, dataset));
-        finding.cause = moved.into_iter().chain(grown).chain(others).collect::<Vec<_>>().join("; ");
+        finding.set_terms(moved.into_iter().chain(grown).chain(others).collect());
     }
 
     /// Whether the joint moved through so small a part of a turn, or of a harmonic's period, that any smooth joint error fits.
@@ -239,14 +239,12 @@ impl FindingBuilder<'_> {
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
         let picture = picture(self.subject, cause, &without, &self.whole.design);
+        let measured = (&self.subject.observed.dataset, &self.extended.frames);
         let finding = Finding {
             effect: cause.kind(),
-            cause: words::describe_cause(
-                cause,
-                &parameters,
-                &self.subject.observed.dataset,
-                &self.extended.frames,
-            ),
+            cause: words::describe_cause(cause, &parameters, measured.0, measured.1),
+            terms: Vec::new(),
+            shift: words::describe_shift(cause, &parameters, measured),
             confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
             rows: cause.rows(),
             row_list: None,

@@ -157,8 +157,7 @@ fn several_joints(members: &[MergedFinding], worth_mm: f64) -> Finding {
             ..parameter.clone()
         })
     });
-    Finding {
-        cause: findings().map(|f| f.cause.as_str()).collect::<Vec<_>>().join("; "),
+    let mut merged = Finding {
         joints: Some(findings().map(joint).collect()),
         parameters: parameters.collect(),
         evidence: findings().map(|f| f.evidence.as_str()).collect::<Vec<_>>().join("; "),
@@ -168,7 +167,10 @@ fn several_joints(members: &[MergedFinding], worth_mm: f64) -> Finding {
         worth_mm: Some(worth_mm),
         alternatives: findings().flat_map(|f| f.alternatives.iter().cloned()).collect(),
         ..first.clone()
-    }
+    };
+    let terms = |f: &Finding| if f.terms.is_empty() { vec![f.cause.clone()] } else { f.terms.clone() };
+    merged.set_terms(findings().flat_map(terms).collect());
+    merged
 }
 
 /// Causes of doubtful findings below `doubtful_mm`, smallest first, as many as exceed [`MOST_REPORTED`].
@@ -256,6 +258,7 @@ fn setup_change(members: &[MergedFinding], worth_mm: f64, steps: bool, smooth: b
                 rows: s.finding.rows?,
                 effect: s.finding.effect,
                 cause: s.finding.cause.clone(),
+                shift: s.finding.shift.clone(),
                 worth_mm: s.finding.worth_mm.unwrap_or(0.0),
             })
         })

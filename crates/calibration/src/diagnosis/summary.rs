@@ -5,7 +5,7 @@ use super::confounding::{Confounding, excess_over_noise_mm};
 use super::contribution::Contributions;
 use super::data_quality::{Deviation, mismatch_finding, noise_floor, outlier_finding, rounding_finding};
 use super::extension::Extended;
-use super::finding::{Finding, Step};
+use super::finding::{Finding, NoiseFloorSource, Step};
 use super::findings::FindingBuilder;
 use super::held_out::FoldErrors;
 use super::joint_scatter::JointScatter;
@@ -27,7 +27,7 @@ pub(super) struct Summary {
     /// The fit to all rows with all parameters of its causes.
     pub(super) extended: Extended,
     /// The noise floor (mm) and its source.
-    pub(super) noise_floor: (Option<f64>, String),
+    pub(super) noise_floor: (Option<f64>, NoiseFloorSource),
     /// The scatter of repeated poses, where enough were repeated.
     pub(super) repeats: Option<NoiseFloor>,
     /// The unexplained residual, in a sentence.

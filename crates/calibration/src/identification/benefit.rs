@@ -673,7 +673,9 @@ impl ScaledCholesky {
 /// It is 1 where the predicted uncertainty is right, and where the fit predicts none. `None` without held-out rows or
 /// finite residuals.
 pub fn inflation_from_rows(training: &Fitted, held: &Observations) -> Option<f64> {
-    let (Some(covariance), x) = (&training.estimate.covariance, &training.estimate.x) else { return Some(1.0) };
+    let (Some(covariance), x) = (&training.estimate.covariance, &training.estimate.x) else {
+        return Some(1.0);
+    };
     if held.dataset.rows.is_empty() {
         return None;
     }

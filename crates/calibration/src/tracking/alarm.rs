@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use truegrind_arm::parameter::Parameter;
 
 /// One of several parameters that moved at once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -35,6 +36,40 @@ pub enum Course {
     Burst,
     /// The readings scatter more than before: `shift` is the ratio.
     Scatter,
+}
+
+/// What can be moved as a whole. An alarm of it has its words for a parameter, in files too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mount {
+    /// The sensor, or the arm's base: readings show only that one moved against the other.
+    Sensor,
+    /// The target on the flange.
+    Target,
+    /// The outlet of a cable, counted from 0.
+    Outlet(usize),
+}
+
+impl Mount {
+    /// What a parameter is part of.
+    pub fn of(parameter: &Parameter) -> Option<Self> {
+        match parameter {
+            Parameter::SensorFrame(_) => Some(Mount::Sensor),
+            Parameter::Target(_) => Some(Mount::Target),
+            Parameter::Outlet { anchor, .. } => Some(Mount::Outlet(*anchor)),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Mount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Mount::Sensor => f.write_str("the sensor against the arm's base"),
+            Mount::Target => f.write_str("the touched point"),
+            Mount::Outlet(0) => f.write_str("the outlet"),
+            Mount::Outlet(anchor) => write!(f, "outlet {}", anchor + 1),
+        }
+    }
 }
 
 /// A detected change.
@@ -78,6 +113,13 @@ pub struct Alarm {
     /// The parameters of a group that moved together; `shift` is then the mean displacement of the readings.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Part>,
+}
+
+impl Alarm {
+    /// Whether `mount` moved as a whole.
+    pub fn is_of(&self, mount: Mount) -> bool {
+        self.parameter == mount.to_string()
+    }
 }
 
 /// Value and standard deviation with the digits that tell something: two of the standard deviation, four decimals where these are enough.

@@ -7,12 +7,11 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-use super::alarm::{Alarm, Course, Part};
+use super::alarm::{Alarm, Course, Mount, Part};
 use super::bounds::accident_bound;
 use super::gauge::Gauge;
 use super::state::{PoseRecord, Snapshot, extend_region};
 use super::tracker::Tracker;
-use super::turn::SENSOR;
 use crate::identification::calibration::Frames;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::registration::points;
@@ -199,8 +198,8 @@ fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Al
         since_row: first.row,
         since_time_h: first.time_h,
         parameter: match found.what {
-            Mounted::Target => "the touched point".to_owned(),
-            Mounted::Sensor => SENSOR.to_owned(),
+            Mounted::Target => Mount::Target.to_string(),
+            Mounted::Sensor => Mount::Sensor.to_string(),
         },
         label: None,
         unit: "mm".to_owned(),

@@ -2,13 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::alarm::{Alarm, Course, Part};
+use super::alarm::{Alarm, Course, Mount, Part};
 use super::bounds::{accident_bound, window_bound};
 use super::locate::{ALTERNATIVE_MARGIN, Change, Explanation, Form, Group, GroupChange, locate};
 use super::mounting::Beside;
 use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
-use super::turn::SENSOR;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::median;
@@ -171,7 +170,7 @@ impl Tracker {
                 .alternatives
                 .iter()
                 .map(|c| name(c.parameter))
-                .chain(found.nearly.map(|g| format!("a move of {}", groups[g].name)))
+                .chain(found.nearly.map(|g| format!("a move of {}", groups[g].mount)))
                 .collect(),
             window_nis,
             parts: Vec::new(),
@@ -247,7 +246,8 @@ impl Tracker {
         };
         alarm.parts = group.members.iter().enumerate().map(part).collect();
         (alarm.shift, alarm.sigma) = self.displacement(group, together);
-        (alarm.parameter, alarm.unit, alarm.course) = (group.name.clone(), "mm".to_owned(), Course::Jump);
+        (alarm.parameter, alarm.unit, alarm.course) =
+            (group.mount.to_string(), "mm".to_owned(), Course::Jump);
         alarm.label = None;
         let rivals = group.covers.iter().filter(|(k, largest)| {
             let near = |change: &&Change| change.parameter == *k && change.shift.abs() <= *largest;
@@ -291,21 +291,15 @@ impl Tracker {
     fn groups(&self) -> Vec<Group> {
         let mut groups: Vec<Group> = Vec::new();
         for (k, parameter) in self.parameters.iter().enumerate() {
-            let name = match parameter {
-                Parameter::SensorFrame(_) => SENSOR.to_owned(),
-                Parameter::Target(_) => TOUCHED_POINT.to_owned(),
-                Parameter::Outlet { anchor: 0, .. } => "the outlet".to_owned(),
-                Parameter::Outlet { anchor, .. } => format!("outlet {}", anchor + 1),
-                _ => continue,
-            };
+            let Some(mount) = Mount::of(parameter) else { continue };
             let reach = if parameter.is_length() { REACH_MM } else { REACH_RAD };
-            match groups.iter_mut().find(|g| g.name == name) {
+            match groups.iter_mut().find(|group| group.mount == mount) {
                 Some(group) => group.members.push((k, reach)),
-                None => groups.push(Group { name, members: vec![(k, reach)], covers: Vec::new() }),
+                None => groups.push(Group { mount, members: vec![(k, reach)], covers: Vec::new() }),
             }
         }
         // Whatever is fixed to the last link moves with it: no reading tells a bent flange or a lost zero of joint 6 from a moved target.
-        if let Some(target) = groups.iter_mut().find(|group| group.name == TOUCHED_POINT) {
+        if let Some(target) = groups.iter_mut().find(|group| group.mount == Mount::Target) {
             let carried = self.parameters.iter().enumerate();
             target.covers =
                 carried.filter_map(|(k, parameter)| Some((k, largest_of_last_link(parameter)?))).collect();
@@ -411,6 +405,3 @@ fn largest_of_last_link(parameter: &Parameter) -> Option<f64> {
 const ZERO_LOST_RAD: f64 = 0.09;
 const BENT_RAD: f64 = 0.003;
 const BENT_MM: f64 = 0.3;
-
-/// What the target is called.
-const TOUCHED_POINT: &str = "the touched point";

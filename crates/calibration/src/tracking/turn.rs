@@ -14,7 +14,7 @@
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use super::alarm::{Alarm, Course};
+use super::alarm::{Alarm, Course, Mount};
 use super::tracker::Tracker;
 use crate::measurement::dataset::Sensor;
 use truegrind_arm::model::Joints;
@@ -89,7 +89,7 @@ impl Tracker {
     pub(super) fn is_of_sensor(&self, alarm: &Alarm) -> bool {
         let is_sensor = |parameter: &Parameter| matches!(parameter, Parameter::SensorFrame(_));
         let named = |parameter: &&Parameter| is_sensor(parameter) && parameter.to_string() == alarm.parameter;
-        alarm.parameter == SENSOR || self.parameters.iter().any(|parameter| named(&parameter))
+        alarm.is_of(Mount::Sensor) || self.parameters.iter().any(|parameter| named(&parameter))
     }
 
     /// The distance of the target from axis 1, RMS (mm).
@@ -184,6 +184,3 @@ fn rigid_rest(points: &[Vector3<f64>], moved: &[Vector3<f64>], angle_rad: f64) -
     }
     Some(normal.cholesky()?.solve(&right).dot(&right))
 }
-
-/// What the sensor is called in alarms.
-pub(super) const SENSOR: &str = "the sensor against the arm's base";

@@ -12,6 +12,7 @@ use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading};
 use truegrind_calibration::measurement::simulation::recipe::{LinkDeviation, Recipe};
 use truegrind_calibration::measurement::{import, split};
+use truegrind_calibration::tracking::alarm::Mount;
 use truegrind_calibration::tracking::locate::{Form, locate};
 use truegrind_calibration::tracking::{Course, Options, State, TrackError, Tracker, first_poses};
 use truegrind_testing::keys::unread;
@@ -128,7 +129,8 @@ fn a_sensor_that_was_knocked_is_named_as_a_whole() {
     let alarms = tracker.process_file(&dataset).unwrap();
     assert_eq!(alarms.len(), 1, "{alarms:#?}");
     let alarm = &alarms[0];
-    assert_eq!(alarm.parameter, "the sensor against the arm's base", "{alarm}");
+    assert!(alarm.is_of(Mount::Sensor) && !alarm.is_of(Mount::Target), "{alarm}");
+    assert_eq!(alarm.parameter, "the sensor against the arm's base", "the word of files");
     assert!(alarm.since_row.abs_diff(72) <= 1 && alarm.parts.len() == 6, "{alarm:#?}");
     assert!((alarm.shift - shift.norm()).abs() < 0.03, "{alarm}");
     assert!(alarm.to_string().contains("sensor."), "{alarm}");
@@ -486,7 +488,7 @@ fn a_target_that_was_mounted_anew_is_one_alarm_and_the_track_goes_on() {
         let said: Vec<String> = alarms.iter().map(ToString::to_string).collect();
         assert_eq!(alarms.len(), 1, "{said:#?}");
         assert_eq!((alarms[0].course, alarms[0].since_row), (Course::Mounted, 72), "{said:#?}");
-        assert_eq!(alarms[0].parameter, "the touched point");
+        assert!(alarms[0].is_of(Mount::Target), "{}", alarms[0]);
         assert!((alarms[0].shift - 62.4).abs() < 0.5, "{said:#?}");
         let turn = alarms[0].parts.first().map(|part| part.shift.to_degrees());
         assert_eq!(turn.is_some(), turn_deg.is_some(), "{said:#?}");

@@ -160,10 +160,9 @@ pub(super) fn in_short(finding: &Finding) -> String {
     if names_a_part && (finding.confidence == Confidence::Ambiguous || several) {
         return sentence(&located(finding.effect, joints, finding.rows));
     }
-    let mut terms = finding.cause.split("; ");
-    let first = sentence(terms.next().unwrap_or_default());
-    match terms.count() {
-        n if n > 0 && names_a_part => {
+    match finding.terms.as_slice() {
+        [first, further @ ..] if !further.is_empty() && names_a_part => {
+            let (first, n) = (sentence(first), further.len());
             format!("{first}; with {n} further {}", if n == 1 { "term" } else { "terms" })
         }
         _ => sentence(&finding.cause),

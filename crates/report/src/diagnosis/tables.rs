@@ -3,7 +3,7 @@
 use super::words::{confidence, place, place_of};
 use crate::number::handy;
 use crate::table::{Cell, Column, Table};
-use truegrind_calibration::diagnosis::finding::{Diagnosis, Finding, FoundParameter, Session};
+use truegrind_calibration::diagnosis::finding::{Diagnosis, Finding, FoundParameter};
 
 /// Errors of the models on other measurements of the same arm.
 pub fn transfer_table(diagnosis: &Diagnosis) -> Table {
@@ -116,18 +116,11 @@ pub(super) fn sessions(finding: &Finding) -> Table {
                 format!("{} to {}", session.rows[0], session.rows[1]).into()
             }),
             (Column::text("what", "cause of a shift of these rows alone"), |session| {
-                shift_alone(session).into()
+                session.shift.as_ref().unwrap_or(&session.cause).as_str().into()
             }),
             (Column::number("worth_mm", "explains", "mm", 3), |session| session.worth_mm.into()),
         ],
     )
-}
-
-/// What shifted, without its rows and without what may have done it.
-fn shift_alone(session: &Session) -> &str {
-    let [from, to] = session.rows;
-    let text = session.cause.split(':').next().unwrap_or_default();
-    text.strip_prefix(&format!("in rows {from} to {to} ")).unwrap_or(text)
 }
 
 /// A p-value; an underflowing one is stated as a bound.
