@@ -22,7 +22,7 @@ use super::summary::{self, Summary};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
 use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
-use crate::identification::benefit::{Benefit, NoBenefit, benefit, inflation_from_errors, widen_by_scale};
+use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{
@@ -32,6 +32,8 @@ use crate::identification::identify::{
     self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition,
     parameter_table, with_sigma_in_region,
 };
+use crate::identification::inflation::inflation_from_errors;
+use crate::identification::linearised_readings::widen_by_scale;
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::identification::unseen_target::unseen_target;

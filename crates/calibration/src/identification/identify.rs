@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use rayon::prelude::*;
 
-use crate::identification::benefit::{Benefit, NoBenefit, benefit, inflation_from_rows, widen_by_scale};
+use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
@@ -12,6 +12,8 @@ use crate::identification::fit::{
     median_orientation_error, orientation_errors, outliers, summary_on,
 };
 use crate::identification::identifiability::Identifiability;
+use crate::identification::inflation::inflation_from_rows;
+use crate::identification::linearised_readings::widen_by_scale;
 use crate::identification::prior_width::width_uncertainty;
 use crate::identification::rounding::{
     AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance, rounding_floor_mm,

@@ -4,10 +4,9 @@
 
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, StageErrors};
 use truegrind_calibration::diagnosis;
-use truegrind_calibration::identification::benefit::{
-    NoBenefit, benefit, inflation_from_errors, inflation_from_rows,
-};
+use truegrind_calibration::identification::benefit::{NoBenefit, benefit};
 use truegrind_calibration::identification::identify::prepare_observations;
+use truegrind_calibration::identification::inflation::{inflation_from_errors, inflation_from_rows};
 use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::identification::verdict::{Limits, VerdictBuilder};
