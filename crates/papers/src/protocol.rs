@@ -45,6 +45,7 @@ use truegrind_calibration::identification::rounding;
 use truegrind_calibration::identification::solver::{Family, Run, SOLVERS, Scope, Solver, SolverError};
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::noise_floor;
 use truegrind_calibration::measurement::split::{self, Split};
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::least_squares::{Factorisation, lm};
@@ -523,7 +524,7 @@ fn parameters_of(case: &Prepared, result: &MethodResult) -> Option<ParameterTabl
 }
 
 fn noise_floor(observed: &Observations, case: &Prepared, sensor_sigma_mm: f64) -> Option<f64> {
-    if let Some(floor) = split::noise_floor(&observed.dataset) {
+    if let Some(floor) = noise_floor::noise_floor(&observed.dataset) {
         return Some(floor.sigma_mm);
     }
     let registered = &case.registered;

@@ -11,7 +11,8 @@ use super::words;
 use crate::identification::fit::Observations;
 use crate::identification::rounding::{NotFused, angle_shares, rounding_floor_mm};
 use crate::measurement::dataset::{Dataset, Sensor};
-use crate::measurement::split;
+use crate::measurement::noise_floor::NoiseFloor;
+use crate::measurement::repeated_poses;
 
 /// Rounding is a finding when it causes more than this share of the variance of the residual, that of geometry or of the extended
 /// model: a larger fault does not hide it.
@@ -197,7 +198,7 @@ const POSES_OF_AN_ANGLE: usize = 4;
 /// A note on joints that stood at a few single angles only, as on a grid of poses. Rows that are held out stand at the same angles,
 /// so that no held-out error shows what a gear does between them.
 pub(super) fn single_angles(dataset: &Dataset) -> Option<String> {
-    let poses = split::poses(dataset).len();
+    let poses = repeated_poses::poses(dataset).len();
     let joints: Vec<String> = (0..6)
         .filter_map(|joint| {
             let mut angles: Vec<f64> = dataset.rows.iter().map(|row| row.joints[joint]).collect();
@@ -225,7 +226,7 @@ pub(super) fn single_angles(dataset: &Dataset) -> Option<String> {
 
 /// The noise floor (mm) of sensor and rounding, and its source.
 pub(super) fn noise_floor(
-    repeated: &Option<split::NoiseFloor>,
+    repeated: &Option<NoiseFloor>,
     subject: &Subject<'_>,
     extended: &Extended,
 ) -> (Option<f64>, NoiseFloorSource) {

@@ -16,7 +16,8 @@ use super::search::{Confirmed, Search};
 use super::something_else::SomethingElse;
 use super::unexplained::{Unexplained, something_else};
 use crate::measurement::dataset::{Dataset, Sensor};
-use crate::measurement::split::{self, NoiseFloor};
+use crate::measurement::noise_floor::{self, NoiseFloor};
+use crate::measurement::split;
 
 /// Summary of a search.
 pub(super) struct Summary {
@@ -49,7 +50,7 @@ pub(super) fn summarise(
     let context = search.context;
     let (subject, searched, prepared) = (&context.subject, &context.searched, context.prepared);
     let (stages, outcome) = (&search.stages, &confirmed.outcome);
-    let floor = split::noise_floor(&without_outliers(search)).filter(NoiseFloor::is_known);
+    let floor = noise_floor::noise_floor(&without_outliers(search)).filter(NoiseFloor::is_known);
     let mut steps = vec![
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },

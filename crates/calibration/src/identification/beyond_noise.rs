@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use crate::measurement::dataset::Sensor;
-use crate::measurement::split::NoiseFloor;
+use crate::measurement::noise_floor::NoiseFloor;
 use truegrind_arm::estimated::StageErrors;
 use truegrind_math::distribution::chi_square_quantile;
 

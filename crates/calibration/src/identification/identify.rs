@@ -25,7 +25,8 @@ use crate::identification::tolerance::Tolerance;
 use crate::identification::unseen_target::unseen_target;
 use crate::identification::verdict::{CONVERGED, Limits, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
-use crate::measurement::split::{self, NoiseFloor, Split};
+use crate::measurement::noise_floor::{self, NoiseFloor};
+use crate::measurement::split::Split;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{
     Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict, WidthUncertainty,
@@ -180,7 +181,7 @@ pub fn identify(
     let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
     // Before the fits, to limit peak memory.
-    let repeats = split::noise_floor(&observed.dataset).filter(NoiseFloor::is_known);
+    let repeats = noise_floor::noise_floor(&observed.dataset).filter(NoiseFloor::is_known);
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let (fitted_rows, held_rows) = {
         let Split { train, test } = split(&observed.dataset);
