@@ -83,4 +83,5 @@ mod findings;
 mod options;
 mod search;
 mod summary;
+mod handover;
 pub mod diagnose;
