@@ -76,6 +76,19 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (summary.mean, summary.standard_deviation)
 }
 
+/// Root mean square; `None` for an empty list.
+///
+/// ```
+/// use truegrind_math::statistics::rms;
+///
+/// assert_eq!(rms(&[3.0, -4.0]), Some(12.5_f64.sqrt()));
+/// assert_eq!(rms(&[]), None);
+/// ```
+pub fn rms(values: &[f64]) -> Option<f64> {
+    let square = values.iter().map(|v| v * v).sum::<f64>();
+    (!values.is_empty()).then(|| (square / values.len() as f64).sqrt())
+}
+
 /// Median; `None` for an empty list. Non-finite values are sorted last.
 ///
 /// ```

@@ -317,11 +317,7 @@ fn enough(
     rows: usize,
     nominal: &Model,
 ) -> Result<(), ExperimentError> {
-    let per = match dataset.sensor {
-        Sensor::Cable => 1,
-        Sensor::Position => 3,
-        Sensor::Pose => 6,
-    };
+    let per = dataset.sensor.scalars();
     let share = methods.protocol.held_out;
     let parameters = link_parameters(nominal).len() + frame_parameters(dataset).len();
     let held_out = (rows as f64 * share).round() as usize;
@@ -532,7 +528,7 @@ fn noise_floor(observed: &Observations, case: &Prepared, sensor_sigma_mm: f64) -
         rounding::angle_shares(&observed.dataset, &registered.model, &registered.frames, &observed.angles);
     let mean = shares.iter().map(|s| s.0).sum::<f64>() / shares.len().max(1) as f64;
     // The error of a position is the norm of its three coordinates.
-    let axes = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let axes = observed.dataset.sensor.axes() as f64;
     let variance = axes * (mean + sensor_sigma_mm * sensor_sigma_mm);
     (variance > 0.0).then(|| variance.sqrt())
 }

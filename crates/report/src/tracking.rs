@@ -3,10 +3,10 @@
 use serde_json::{Value, json};
 
 use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
-use super::number::handy;
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
+use truegrind_arm::parameter::display_unit;
 use truegrind_calibration::tracking::alarm::Mount;
 use truegrind_calibration::tracking::state::ConsumedFile;
 use truegrind_calibration::tracking::{Alarm, Departure, Tracker};
@@ -142,8 +142,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     let nis: Vec<f64> = state.history.iter().map(|s| s.nis).filter(|n| n.is_finite()).collect();
     // A single pose after remounting may have a NIS of a million, which would dominate the mean.
     let usual = (!nis.is_empty()).then(|| median(&nis));
-    let degrees = tracker.state().sensor.scalars() as f64;
-    let expected = degrees * (1.0 - 2.0 / (9.0 * degrees)).powi(3);
+    let expected = tracker.expected_median_nis();
     page.push(vec![
         KeyFigure::new("Poses", state.poses, 0, "").note(format!("{} set aside", state.accidents)),
         KeyFigure::new("NIS of the latest poses", usual, 2, "").note(format!(
@@ -213,7 +212,7 @@ fn departure_sentence(now: &Departure) -> String {
         now.rms_mm, now.expected_mm
     );
     let moved = now.parameters.iter().take(LISTED).map(|(name, unit, by, sigma)| {
-        let (scale, unit) = handy(unit);
+        let (scale, unit) = display_unit(unit);
         format!("{name} {:+.4} ± {:.4} {unit}", by * scale, sigma * scale)
     });
     let moved: Vec<String> = moved.collect();
@@ -268,7 +267,7 @@ pub fn table(tracker: &Tracker) -> Table {
     );
     let sigmas = tracker.sigmas();
     for ((parameter, value), sigma) in tracker.parameters().iter().zip(tracker.deviations()).zip(sigmas) {
-        let (scale, unit) = handy(parameter.unit());
+        let (scale, unit) = display_unit(parameter.unit());
         table.push([
             parameter.to_string().into(),
             unit.into(),

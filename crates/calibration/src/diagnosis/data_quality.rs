@@ -10,7 +10,7 @@ use super::validation::{StageError, Validation};
 use super::words;
 use crate::identification::fit::Observations;
 use crate::identification::rounding::{NotFused, angle_shares, rounding_floor_mm};
-use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::dataset::Dataset;
 use crate::measurement::noise_floor::NoiseFloor;
 use crate::measurement::repeated_poses;
 
@@ -33,7 +33,7 @@ pub(super) fn rounding_finding(
     let step = dataset.angle_step_rad.filter(|_| !few_poses)?;
     let logged = &prepared.logged;
     let shares = angle_shares(&logged.dataset, &geometric.model, &geometric.frames, &logged.angles);
-    let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let coordinates = dataset.sensor.axes() as f64;
     let share = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
     let raw = Subject { observed: logged, ..*subject };
     let unsharpened = fit(&raw, &[], Freedom::All, Some(geometric));

@@ -23,6 +23,7 @@ use super::words;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::error_map::ErrorMap;
+use truegrind_math::sentence::{counted, listed};
 
 /// A rival (including the model without the finding) whose held-out error is below this share of the finding's is not beaten,
 /// whatever the Bayes factor.
@@ -254,9 +255,9 @@ impl FindingBuilder<'_> {
                 "{}: χ² falls by {:.0} for {} with everything else refitted; twice the log Bayes factor {:.0} with {} tried",
                 words::describe_pattern(cause),
                 own.own.gain,
-                counted(own.own.estimate.len(), "parameter"),
+                counted(own.own.estimate.len(), "parameter", "parameters"),
                 own.own.evidence,
-                counted(own.tried.round() as usize, "variant"),
+                counted(own.tried.round() as usize, "variant", "variants"),
             ),
             parameters,
             p_value: own.log_p.exp(),
@@ -304,10 +305,6 @@ pub(super) fn is_some_spring(finding: &Finding) -> bool {
     spring(finding.effect) && finding.doubts.is_empty() && rivals.all(|rival| spring(rival.effect))
 }
 
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
 pub(super) fn short_name(cause: &Cause) -> String {
     let joints = cause.joints();
     match (joints.as_slice(), cause.rows()) {
@@ -315,8 +312,7 @@ pub(super) fn short_name(cause: &Cause) -> String {
         ([], None) => cause.kind().to_string(),
         ([joint], _) => format!("{} of joint {}", cause.kind(), joint + 1),
         (many, _) => {
-            let list: Vec<String> = many.iter().map(|j| (j + 1).to_string()).collect();
-            format!("{} of joints {}", cause.kind(), list.join(" and "))
+            format!("{} of joints {}", cause.kind(), listed(many.iter().map(|j| j + 1)))
         }
     }
 }

@@ -17,6 +17,7 @@ use super::finding::{Confidence, Family, Finding, FoundParameter, Gain, Session}
 use super::findings::is_some_spring;
 use super::picture::Picture;
 use super::words;
+use truegrind_math::sentence::listed;
 
 /// A finding with its causes.
 #[derive(Debug, Clone)]
@@ -302,11 +303,10 @@ fn setup_change(members: &[MergedFinding], worth_mm: f64, steps: bool, smooth: b
 
 /// "The zero of joint 2", "the zeros of joints 1, 2 and 3".
 fn zeros_of(joints: &BTreeSet<usize>) -> String {
-    let numbers: Vec<String> = joints.iter().map(usize::to_string).collect();
-    match numbers.as_slice() {
-        [one] => format!("the zero of joint {one}"),
-        [first @ .., last] => format!("the zeros of joints {} and {last}", first.join(", ")),
-        [] => "the zeros of joints".to_owned(),
+    match joints.len() {
+        0 => "the zeros of joints".to_owned(),
+        1 => format!("the zero of joint {}", listed(joints)),
+        _ => format!("the zeros of joints {}", listed(joints)),
     }
 }
 

@@ -68,7 +68,7 @@ pub(super) fn summarise(
         growth_mm: outcome.discrepancy.growth_mm(),
         field_mm: outcome.discrepancy.field_mm(),
         excess_over_noise_mm: floor.map_or(0.0, |floor| {
-            let coordinates = if context.dataset.sensor == Sensor::Cable { 1 } else { 3 };
+            let coordinates = context.dataset.sensor.axes();
             excess_over_noise_mm(stages[2].fitted.rmse, floor.sigma_mm, coordinates * floor.freedom)
         }),
     };

@@ -18,7 +18,7 @@ use crate::measurement::dataset::{Dataset, Row, Sensor};
 use crate::measurement::sensor::disturbance::Disturbance;
 use truegrind_arm::estimated::Judgement;
 use truegrind_arm::model::Model;
-use truegrind_math::statistics::ErrorSummary;
+use truegrind_math::statistics::{ErrorSummary, rms};
 
 /// Models of one series.
 #[derive(Debug, Clone, Copy)]
@@ -176,14 +176,9 @@ impl Foreign {
     }
 }
 
-/// Root mean square.
-fn rms(errors: &[f64]) -> f64 {
-    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
-}
-
 /// The error over that along each axis.
 fn per_axis(sensor: Sensor) -> f64 {
-    if sensor == Sensor::Cable { 1.0 } else { 3_f64.sqrt() }
+    (sensor.axes() as f64).sqrt()
 }
 
 impl Diagnosed {
@@ -197,7 +192,8 @@ impl Diagnosed {
     ) -> Option<Foreign> {
         let sensor = observed.dataset.sensor;
         let [nominal, _, _, written] = errors;
-        let left_mm = rms(written) / per_axis(sensor);
+        let written_mm = rms(written)?;
+        let left_mm = written_mm / per_axis(sensor);
         if left_mm > OTHER_ARM_MM {
             return Some(Foreign::NotThisArm);
         }
@@ -213,8 +209,8 @@ impl Diagnosed {
         let another = fit(&subject, &[], Freedom::All, None);
         let readings = observed.dataset.rows.len() * sensor.scalars();
         let factor = if sensor == Sensor::Cable { CHANGED_CABLE } else { CHANGED };
-        let another_mm = rms(&errors_on(observed, &another.model, &another.frames));
-        let is_changed = readings >= another.parameters.len() + FREE && factor * another_mm < rms(written);
+        let another_mm = rms(&errors_on(observed, &another.model, &another.frames))?;
+        let is_changed = readings >= another.parameters.len() + FREE && factor * another_mm < written_mm;
         match (is_changed, left_mm > FOREIGN * held_out_mm) {
             (true, _) => Some(Foreign::Changed(another_mm)),
             (false, true) => Some(Foreign::Scatters),

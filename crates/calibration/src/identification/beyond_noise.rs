@@ -42,11 +42,10 @@ impl BeyondNoise {
     /// A cable sees one coordinate of the error, taken as alike in all three. Of few rows the held-out error is large because the
     /// parameters are uncertain, which is stated elsewhere: the smaller of held-out and fitted error counts.
     pub fn of(errors: &StageErrors, sensor: Sensor, repeats: Option<&NoiseFloor>) -> Self {
-        let coordinates: usize = if sensor == Sensor::Cable { 1 } else { 3 };
         let seen_mm = errors.held_out.rmse.min(errors.fitted.rmse);
         let of_position = of_position(sensor);
         let Some(floor) = repeats else { return Self::AtMost(of_position * seen_mm) };
-        let freedom = coordinates * floor.freedom;
+        let freedom = sensor.axes() * floor.freedom;
         let noise_mm = floor.sigma_mm * (freedom as f64 / chi_square_quantile(CERTAIN, freedom)).sqrt();
         Self::Known(if seen_mm > noise_mm {
             of_position * (seen_mm.powi(2) - floor.sigma_mm.powi(2)).max(0.0).sqrt()

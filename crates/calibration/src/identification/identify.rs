@@ -36,6 +36,7 @@ use truegrind_arm::parameter::{Parameter, arm_parameters, link_parameters};
 use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Termination;
 use truegrind_estimation::problem::Problem;
+use truegrind_math::sentence::listed;
 use truegrind_math::statistics::{ErrorSummary, largest, median};
 use truegrind_math::work::{checkpoint, report_step};
 
@@ -448,11 +449,7 @@ pub fn prepare_observations(
 
 fn check_row_count(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), IdentifyError> {
     let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
-    let per = match dataset.sensor {
-        Sensor::Cable => 1,
-        Sensor::Position => 3,
-        Sensor::Pose => 6,
-    };
+    let per = dataset.sensor.scalars();
     let rows = dataset.rows.len();
     let needed = (((parameters + 1).div_ceil(per)) as f64 / (1.0 - held_out)).ceil() as usize;
     let poses = count_distinct_poses(dataset, 2 * needed);
@@ -669,8 +666,7 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
             if case.still.len() == 1 {
                 format!("joint {} moved through a range", case.still[0])
             } else {
-                let joints: Vec<String> = case.still.iter().map(usize::to_string).collect();
-                format!("joints {} moved through ranges", joints.join(", "))
+                format!("joints {} moved through ranges", listed(&case.still))
             },
             STILL_DEG,
             if case.still.len() == 1 { "it" } else { "them" }

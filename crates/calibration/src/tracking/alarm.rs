@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use truegrind_arm::parameter::Parameter;
+use truegrind_arm::parameter::{Parameter, display_unit};
 
 /// One of several parameters that moved at once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -137,15 +137,6 @@ fn with_sigma(value: f64, sigma: f64) -> String {
 
 /// Most decimals without an exponent.
 const MOST_DECIMALS: f64 = 6.0;
-
-/// Factor to the displayed unit, and that unit.
-fn display_unit(unit: &str) -> (f64, &str) {
-    match unit {
-        "rad" => (1f64.to_degrees(), "°"),
-        "" => (1.0, ""),
-        other => (1.0, other),
-    }
-}
 
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

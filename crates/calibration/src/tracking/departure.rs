@@ -19,6 +19,7 @@ use super::tracker::Tracker;
 use super::turn::{Turn, is_of_joint_1};
 use crate::identification::placement::{fill, place};
 use truegrind_arm::model::{Joints, Model};
+use truegrind_math::distribution::wilson_hilferty;
 
 /// The arm as tracked against the model that the track began with.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,7 +103,7 @@ impl Tracker {
             let covariance = start.covariance()?.view((0, 0), (arm, arm)).into_owned();
             Some(distance(&placed(&self.without_rows().apply(&start.x).0), &covariance))
         });
-        let noise_mm = self.state.sigma_mm * (self.state.sensor.scalars().min(3) as f64).sqrt();
+        let noise_mm = self.state.sigma_mm * (self.state.sensor.axes() as f64).sqrt();
         let told = self.state.alarms.iter().rev().find(|alarm| self.tells_of_the_arm(alarm)).cloned();
         // Joint 1 moves no shape: a turn about its axis counts by itself.
         let told_of_shape =
@@ -165,8 +166,7 @@ impl Distance {
         // Σλ is the trace of the Gram matrix, Σλ² the square of its norm.
         let gram = axes.tr_mul(&axes);
         let freedom = (gram.trace().powi(2) / gram.norm_squared()).max(1.0);
-        let spread = 2.0 / (9.0 * freedom);
-        let factor = (1.0 - spread + DEVIATIONS * spread.sqrt()).powi(3).sqrt();
+        let factor = wilson_hilferty(freedom, DEVIATIONS).sqrt();
         let rms = |square: f64| (square / poses as f64).sqrt();
         let expected_mm = rms(gram.trace());
         Self { rms_mm: rms(columns.column(0).norm_squared()), expected_mm, bound_mm: factor * expected_mm }

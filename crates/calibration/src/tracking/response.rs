@@ -10,6 +10,7 @@ use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
+use truegrind_math::distribution::wilson_hilferty;
 use truegrind_math::statistics::median;
 
 /// Smallest likelihood ratio of a change that is reported: 1 in 10⁵ for one parameter and one pose, 1 in a hundred after the
@@ -130,9 +131,13 @@ impl Tracker {
     pub(super) fn scatter(&self, poses: usize) -> Option<f64> {
         let history = &self.state.history;
         let latest: Vec<f64> = history[history.len().saturating_sub(poses)..].iter().map(|s| s.nis).collect();
+        Some((median(&latest)? / self.expected_median_nis()).sqrt())
+    }
+
+    /// The median of a pose's NIS, if arm, sensor and noise match the model.
+    pub fn expected_median_nis(&self) -> f64 {
         let degrees = self.state.sensor.scalars() as f64;
-        let expected = degrees * (1.0 - 2.0 / (9.0 * degrees)).powi(3);
-        Some((median(&latest)? / expected).sqrt())
+        degrees * wilson_hilferty(degrees, 0.0)
     }
 
     /// Alarm of an explained change.

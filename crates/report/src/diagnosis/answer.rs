@@ -1,6 +1,6 @@
 //! The answer of a diagnosis, on one screen: what was found, where, how sure that is, and what to do.
 
-use super::words::{and, confidence, family, located, member, sentence};
+use super::words::{confidence, family, located, member};
 use crate::document::{Block, Verdict};
 use crate::status::Status;
 use crate::table::{Column, Table};
@@ -8,12 +8,13 @@ use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::decision::DIAGNOSIS_FILE;
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, Finding};
 use truegrind_calibration::measurement::dataset::Sensor;
+use truegrind_math::sentence::{capitalised, counted, listed};
 
 /// How many causes were found, and what they gain.
 pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
     let sure = diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count();
     let further = diagnosis.findings.iter().filter(|f| is_possible(f)).count();
-    let causes = |n: usize| if n == 1 { "1 cause".to_owned() } else { format!("{n} causes") };
+    let causes = |n: usize| counted(n, "cause", "causes");
     let found = match (sure, further) {
         (0, 0) => "No cause beyond geometry was found".to_owned(),
         (0, n) => format!("No cause beyond geometry is certain, {n} {} possible", be(n)),
@@ -153,19 +154,19 @@ pub(super) fn in_short(finding: &Finding) -> String {
     let joints = finding.joints.as_deref();
     if !finding.members.is_empty() {
         let members: Vec<String> = finding.members.iter().map(member).collect();
-        return sentence(&format!("an error {}: {}", family(finding), members.join(", ")));
+        return capitalised(&format!("an error {}: {}", family(finding), members.join(", ")));
     }
     let names_a_part = finding.non_centrality.is_some();
     let several = joints.is_some_and(|joints| joints.len() > 1);
     if names_a_part && (finding.confidence == Confidence::Ambiguous || several) {
-        return sentence(&located(finding.effect, joints, finding.rows));
+        return capitalised(&located(finding.effect, joints, finding.rows));
     }
     match finding.terms.as_slice() {
         [first, further @ ..] if !further.is_empty() && names_a_part => {
-            let (first, n) = (sentence(first), further.len());
-            format!("{first}; with {n} further {}", if n == 1 { "term" } else { "terms" })
+            let further = counted(further.len(), "further term", "further terms");
+            format!("{}; with {further}", capitalised(first))
         }
-        _ => sentence(&finding.cause),
+        _ => capitalised(&finding.cause),
     }
 }
 
@@ -187,5 +188,5 @@ fn actions(diagnosis: &Diagnosis) -> Vec<String> {
     let names_file = out.iter().any(|(action, _)| action.contains(DIAGNOSIS_FILE));
     let file =
         names_file.then(|| format!("{DIAGNOSIS_FILE} is what `diagnose --json {DIAGNOSIS_FILE}` writes"));
-    out.into_iter().map(|(action, numbers)| format!("{}: {action}", and(&numbers))).chain(file).collect()
+    out.into_iter().map(|(action, numbers)| format!("{}: {action}", listed(&numbers))).chain(file).collect()
 }

@@ -1,8 +1,8 @@
 //! Tables of a diagnosis.
 
 use super::words::{confidence, place, place_of};
-use crate::number::handy;
 use crate::table::{Cell, Column, Table};
+use truegrind_arm::parameter::display_unit;
 use truegrind_calibration::diagnosis::finding::{Diagnosis, Finding, FoundParameter};
 
 /// Errors of the models on other measurements of the same arm.
@@ -140,7 +140,7 @@ pub(super) fn parameters(finding: &Finding) -> Table {
     // The knots of a map are shown as a plot.
     let shown: Vec<&FoundParameter> = finding.parameters.iter().filter(|p| p.name != "knot").collect();
     for parameter in shown {
-        let (scale, unit) = handy(&parameter.unit);
+        let (scale, unit) = display_unit(&parameter.unit);
         table.push([
             Cell::from(parameter.name.as_str()),
             Cell::with_sigma(parameter.value * scale, parameter.sigma.map(|s| s * scale)),

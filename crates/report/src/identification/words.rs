@@ -11,6 +11,7 @@ use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::noise_floor::noise_floor;
+use truegrind_math::sentence::listed;
 
 /// Remarks on the errors.
 pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> {
@@ -101,10 +102,7 @@ fn combination(found: &Identification, terms: &[(Parameter, f64)]) -> String {
     match moves.as_slice() {
         [] => "a combination without dominant members is not identifiable".to_owned(),
         [one] => format!("{one} is not identifiable"),
-        [first, other] => format!("{first} together with {other} is not identifiable"),
-        [first, others @ .., last] => {
-            format!("{first} together with {} and {last} is not identifiable", others.join(", "))
-        }
+        [first, others @ ..] => format!("{first} together with {} is not identifiable", listed(others)),
     }
 }
 
