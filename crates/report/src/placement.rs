@@ -53,8 +53,9 @@ fn apart(plan: &Plan, what: &str, is_corrected: impl Fn(&ObjectPlacement) -> boo
     let most_mm = moved_mm.map(|placement| placement.deviation_mm).fold(0.0, f64::max);
     (!moved.is_empty() && !kept.is_empty()).then(|| {
         format!(
-            "the placement over {} is corrected, over {} it is not: the path over the one is displaced against the other by up to {most_mm:.3} mm. \
-             If these {what}s belong together, give them one user frame, or decide for both (--placement shape, --placement absolute)",
+            "the placement is corrected over {} and not over {}: paths over them shift against each other by up to {most_mm:.3} mm. \
+             If these {what}s belong together, give them one user frame, or decide for both (--placement shape, --placement \
+             absolute)",
             moved.join(", "),
             kept.join(", ")
         )
@@ -103,8 +104,8 @@ fn sentence(placement: &ObjectPlacement, what: &str) -> String {
     }
     let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(
-        "{named}: only the shape is corrected, not the placement; {known}; correcting that too would make the path worse \
-         with a probability of {}; {remedy}--placement absolute corrects it anyway",
+        "{named}: only the shape is corrected; {known}; correcting the placement too would make the path worse with a probability of \
+         {}; {remedy}--placement absolute corrects it anyway",
         percent_of(*probability_of_harm)
     )
 }

@@ -101,7 +101,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     };
     let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
     let earlier = departed.filter(|_| alarms.is_empty()).and_then(|now| now.told.as_ref());
-    reasons.extend(earlier.map(|alarm| format!("told in an earlier run: {alarm}")));
+    reasons.extend(earlier.map(|alarm| format!("reported in an earlier run: {alarm}")));
     reasons.extend(departed.filter(|now| now.is_of_shape).map(departure_sentence));
     reasons.extend(departed.and_then(turn_sentence));
     reasons.extend(which_moved(alarms));
@@ -178,10 +178,11 @@ fn turn_headline(now: &Departure) -> String {
 fn turn_sentence(now: &Departure) -> Option<String> {
     let turn = now.turn.as_ref().filter(|turn| turn.is_significant)?;
     Some(format!(
-        "since the first poses, arm and sensor have turned against each other by {:.4} ± {:.4}° about axis 1, which is {:.3} mm RMS at the target. \
-         Joint 1 lost its zero, or the base turned: then programs on parts that stand beside the arm are off by as much. Or the sensor was \
-         moved about axis 1: then they are right. The readings are the same. To tell: read three points fixed to the floor; if they \
-         moved for the sensor, it was the sensor. Else read points on the arm's foot; if they moved, it was the base, if not, joint 1",
+        "since the first poses, arm and sensor have turned against each other by {:.4} ± {:.4}° about axis 1, which is {:.3} mm RMS \
+         at the target. Either joint 1 lost its zero or the base turned, and programs on parts next to the arm are off by this; or \
+         the sensor was moved about axis 1, and they are right. The readings cannot tell. Measure three points fixed to the floor: \
+         if they moved for the sensor, it was the sensor. Else measure points on the arm's foot: if they moved, it was the base, if \
+         not, joint 1",
         turn.angle_rad.to_degrees(),
         turn.sigma_rad.to_degrees(),
         turn.rms_mm
@@ -197,8 +198,9 @@ fn which_moved(alarms: &[Alarm]) -> Vec<String> {
             .to_owned()
     });
     let sensor = any(Mount::Sensor).then(|| {
-        "sensor or base: the readings tell only that one moved against the other. Read three points fixed to the floor: if they moved for the \
-         sensor, it was the sensor, and the programs are right; if not, it was the base, and programs on parts beside the arm are off"
+        "sensor or base: the readings show only that one moved against the other. Measure three points fixed to the floor: if they \
+         moved for the sensor, it was the sensor, and the programs are right; if not, it was the base, and programs on parts next to \
+         the arm are off"
             .to_owned()
     });
     target.into_iter().chain(sensor).collect()
@@ -207,8 +209,8 @@ fn which_moved(alarms: &[Alarm]) -> Vec<String> {
 /// How far the arm has moved, and its parameters that moved most.
 fn departure_sentence(now: &Departure) -> String {
     let mut out = format!(
-        "over the measured region, and apart from the placement of base and target, the arm is {:.3} mm RMS from the model that the track \
-         began with, where the uncertainties let expect {:.3} mm: programs that were corrected with it are off by as much",
+        "over the measured region, and apart from the placement of base and target, the arm is {:.3} mm RMS from the model that the \
+         track began with; the uncertainties alone would make {:.3} mm: programs that were corrected with it are off by this much",
         now.rms_mm, now.expected_mm
     );
     let moved = now.parameters.iter().take(LISTED).map(|(name, unit, by, sigma)| {
@@ -237,16 +239,17 @@ fn noise_sentences(tracker: &Tracker) -> Vec<String> {
     });
     let overstated = tracker.overstated_noise().map(|noise| {
         format!(
-            "remark: the readings scatter by {:.3} mm along each axis, but the track counts with {:.3} mm (--sigma, or what the model left \
-             over): a sudden change that moves the readings by less than about {:.2} mm is not told; a new track with --sigma {:.3} is finer",
+            "remark: the readings scatter by {:.3} mm along each axis, but the track counts with {:.3} mm (--sigma, or what the model \
+             left over): a sudden change that moves the readings by less than about {:.2} mm goes unnoticed; a new track with \
+             --sigma {:.3} would see it",
             noise.seen_mm, noise.sigma_mm, noise.smallest_change_mm, 1.25 * noise.seen_mm
         )
     });
     let worse = tracker.worse_fit().map(|ratio| {
         format!(
-            "the latest readings fit {ratio:.1} times less well than the first ones, though within the noise that the track counts with: arm, \
-             sensor or target moved a little, or the poses lie elsewhere; if they lie as before, begin a new track with a --sigma of what the \
-             first ones scattered, which tells what moved"
+            "the latest readings fit {ratio:.1} times less well than the first ones, though within the noise that the track counts \
+             with: arm, sensor or target moved a little, or the poses lie elsewhere; if they lie as before, begin a new track with \
+             --sigma set to the scatter of the first ones, to find out what moved"
         )
     });
     worse.into_iter().chain(replaced).chain(overstated).collect()

@@ -170,7 +170,8 @@ fn build_diagnosis(
         && let crate::identification::rounding::NotFused::Mismatch { found_mm, expected_mm } = why
     {
         notes.push(format!(
-            "the read-out deviates from the angles by {found_mm:.2} mm where rounding allows {expected_mm:.2} mm: it was not fused with them"
+            "the readout deviates from the angles by {found_mm:.2} mm, and rounding allows {expected_mm:.2} mm: it was not fused with \
+             them"
         ));
     }
     notes.extend(single_angles(dataset));
@@ -178,7 +179,7 @@ fn build_diagnosis(
         && search.found.causes.iter().any(|c| matches!(c, Cause::Arm(Effect::Backlash(_))))
     {
         notes.push(
-            "the sides of approach were not logged (columns approach1 to approach6): backlash was judged as if every row had been approached \
+            "the sides of approach were not logged (columns approach1 to approach6): backlash was judged as if the arm had come \
              straight from the row before"
                 .to_owned(),
         );

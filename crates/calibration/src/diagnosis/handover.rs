@@ -85,7 +85,7 @@ impl Handover<'_> {
         let fit = if fit.causes.is_empty() { self.as_identified(&fit).unwrap_or(fit) } else { fit };
         notes.extend(probability.map(|probability| {
             format!(
-                "the written arm leaves the causes in the measurement out of its fit, since with them its links might be worse (probability \
+                "the written arm was fitted without the causes in the measurement, which might make its links worse (probability \
                  {:.0} %, at most {:.0} % are allowed)",
                 100.0 * probability,
                 100.0 * sensor_causes::MOST_PROBABILITY
@@ -127,7 +127,7 @@ impl Handover<'_> {
             return with_causes;
         }
         notes.push(format!(
-            "the written arm is geometry alone, as `identify` fits it: beside the causes the arm is refused, since {}",
+            "the written arm is geometry alone, as `identify` fits it, since the arm with causes was refused: {}",
             verdict.reasons.first().map_or("it is implausible", String::as_str)
         ));
         alone

@@ -162,10 +162,11 @@ impl Foreign {
                     .to_owned()
             }
             Foreign::BelowDataSheet => format!(
-                "the data sheet is nearer there, so it is another arm of this type, or the arm has changed in between: {otherwise}"
+                "the data sheet is nearer there, so it is another arm of this type, or the arm has changed: {otherwise}"
             ),
             Foreign::Changed(left_mm) => format!(
-                "the arm has changed in between, or it is another one, as another geometry leaves {left_mm:.3} mm there: {otherwise}"
+                "the arm has changed, or it is another one (another geometry, fitted to those rows, leaves {left_mm:.3} mm): \
+                 {otherwise}"
             ),
             Foreign::Scatters => {
                 "no other geometry explains it, so the readings scatter more there, or the load was another, or it is another arm: check sensor, \

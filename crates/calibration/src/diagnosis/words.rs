@@ -305,7 +305,7 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
             value.to_degrees()
         ),
         EmpiricalFault::LoadedPlay { .. } => format!(
-            "joint {joint} has {:.4}° of play that its load closes: gravity decides which flank bears",
+            "joint {joint} has {:.4}° of backlash that gravity closes: the load decides which flank of the gear carries it",
             value.to_degrees()
         ),
         EmpiricalFault::TwoJointGear { other, .. } => {
@@ -512,12 +512,12 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         CableDrum => "check the cable sensor against a length standard over its whole range",
         TargetNest => "turn the target towards the sensor; check its nest and replace the reflector",
         TargetDroop => {
-            "stiffen the target's pole or adapter, or measure with the target near the flange; the written model does not include it, since no \
-             tool droops so"
+            "stiffen the target's pole or adapter, or measure with the target near the flange; the written model leaves it out, since \
+             a tool does not droop this way"
         }
         BaseTilt => {
-            "bolt or grout the pedestal, and read a level on it with the arm stretched out and folded; the written model includes of it \
-             what a yielding joint 2 does as well, so measure again then"
+            "bolt or grout the pedestal, and read a level on it with the arm stretched out and folded; the written model contains \
+             only the part that looks like compliance of joint 2, so measure again afterwards"
         }
         CableSag => "increase the cable's tension or shorten the distance",
         AngleRounding => "log angles with more digits",
@@ -526,7 +526,7 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         SetupChange => {
             "measure reference points before and after each session, and repeat the rows of displaced sessions"
         }
-        SmallDisturbances => "none: the model includes those that are the arm's",
+        SmallDisturbances => "nothing: the arm's share of them is in the model",
         _ => "measure more poses where the picture shows the largest residuals",
     }
 }

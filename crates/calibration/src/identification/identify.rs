@@ -662,7 +662,7 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     verdict.check_links(case.parameters, &options.tolerance, 0.0);
     if !case.still.is_empty() {
         verdict.note(format!(
-            "{} of less than {:.0}°: what these rows do not show of {} stays as the data sheet has it",
+            "{} of less than {:.0}°: whatever these rows do not show of {} stays as in the data sheet",
             if case.still.len() == 1 {
                 format!("joint {} moved through a range", case.still[0])
             } else {

@@ -185,7 +185,7 @@ impl VerdictBuilder {
         if status == Judgement::Fail
             && let Some(benefit) = self.benefit.and_then(|k| self.others.get_mut(k))
         {
-            benefit.insert_str(0, "if what is said above were not so: ");
+            benefit.insert_str(0, "apart from the problems above: ");
         }
         reasons.append(&mut self.others);
         Verdict { status, reasons }
@@ -236,9 +236,9 @@ pub const MOST_PERCENT: f64 = 99.9;
 fn benefit_sentence(found: &Benefit) -> String {
     let probability = percent_of(found.probability);
     format!(
-        "inside the measured region, apart from the placement of base and flange, the expected RMS error is {:.3} mm for the \
-         nominal arm and {:.3} mm for the estimated one{}: it improves programs with a probability of {probability} (at least \
-         {:.0} % is required)",
+        "inside the measured region, placement of base and flange excluded, the expected RMS error is {:.3} mm for the nominal arm \
+         and {:.3} mm for the estimated one{}: it improves programs with a probability of {probability} (at least {:.0} % is \
+         required)",
         found.nominal_mm,
         found.estimated_mm,
         scale_clause(found) + &beyond_noise_clause(found),
@@ -265,9 +265,7 @@ fn beyond_noise_clause(found: &Benefit) -> String {
     let Some(beyond) = found.beyond_noise else { return String::new() };
     let mut out = match beyond.known_mm() {
         Some(mm) if mm > 0.5 * found.estimated_mm => {
-            format!(
-                ", {mm:.3} mm of it from effects that the model does not contain, as the readings show beyond their noise"
-            )
+            format!(", of which {mm:.3} mm come from effects that the model does not contain")
         }
         _ => String::new(),
     };
@@ -277,7 +275,7 @@ fn beyond_noise_clause(found: &Benefit) -> String {
     let further_mm = (most_mm.powi(2) - least_mm.powi(2)).max(0.0).sqrt();
     if further_mm > found.estimated_mm {
         out += &format!(
-            ", or up to {:.3} mm if what the readings still deviate is the arm's and not noise, which repeated poses would tell",
+            ", or up to {:.3} mm if the unexplained rest is the arm's and not noise (repeated poses would show it)",
             further_mm.hypot(found.estimated_mm)
         );
     }
@@ -307,19 +305,21 @@ fn law_sentence(law: &LawError) -> String {
     let (error, remedy) = match law.kind {
         SensorLaw::Pulley => (
             "a cable that runs over a pulley at its outlet, of a radius of some 10 mm,",
-            "measure poses that turn the cable more widely about its outlet, best random ones all over the ranges of the joints, or some more with \
-             the outlet elsewhere; a cable that leaves its sensor through a small hole has no such error",
+            "measure poses that swing the cable further about its outlet (random poses over the full ranges of the joints, or some \
+             with the outlet elsewhere); a cable that leaves its sensor through a small hole has no such error",
         ),
         SensorLaw::Drum => (
             "a cable whose length is wound on in layers",
-            "measure poses at more directions of the cable for each of its lengths, best random ones all over the ranges of the joints, and the \
-             sensor itself against a known length",
+            "measure poses at more directions of the cable for each of its lengths (random poses over the full ranges of the joints), \
+             and the sensor itself against a known length",
         ),
     };
     let explains = if law.probability > FOUND {
         format!("{error} explains these readings better than the arm alone")
     } else {
-        format!("these poses do not tell the arm from its sensor: {error} would read much the same")
+        format!(
+            "these poses cannot separate the arm from its sensor: {error} would give nearly the same readings"
+        )
     };
     let helps = law.benefit_with.map_or_else(String::new, |with| {
         format!(", and with it the model improves programs with a probability of {} only", percent_of(with))
@@ -330,12 +330,12 @@ fn law_sentence(law: &LawError) -> String {
 fn remedy(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Cable => {
-            "check millimetres per count of the draw-wire and measure a known length with it; correct the readings, or state how well the length \
-             was met (--sensor-scale-sigma), and identify again"
+            "measure a known length with the draw-wire and check its millimetres per count; correct the readings, or state how well \
+             the length agreed (--sensor-scale-sigma), and identify again"
         }
         Sensor::Position | Sensor::Pose => {
-            "check unit, scale and atmosphere of the tracker and measure a known length (a scale bar) with it; correct the readings, or state how \
-             well the length was met (--sensor-scale-sigma), and identify again"
+            "measure a known length (a scale bar) with the tracker and check its unit, scale and atmosphere; correct the readings, or \
+             state how well the length agreed (--sensor-scale-sigma), and identify again"
         }
     }
 }

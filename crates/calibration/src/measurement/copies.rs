@@ -30,7 +30,7 @@ pub(super) fn without_copies(dataset: Dataset) -> Dataset {
     let mut out = dataset.subset(&indices);
     let numbers: Vec<usize> = copies.iter().map(|&i| dataset.rows[i].number).collect();
     out.notes.push(format!(
-        "{} of earlier rows, equal to the last digit of the reading, and left out: a copy is no further measurement",
+        "{} of earlier rows, identical to the last digit of the reading, and left out",
         if numbers.len() == 1 {
             format!("{} is a copy", row_list(&numbers))
         } else {

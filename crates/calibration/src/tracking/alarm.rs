@@ -186,7 +186,7 @@ impl fmt::Display for Alarm {
         write!(f, "{name} {verb}")?;
         let is_whole = !self.parts.is_empty();
         if is_whole && self.shift < 2.0 * self.sigma {
-            write!(f, ", by how much the poses do not tell yet,")?;
+            write!(f, ", by an amount that the poses do not show yet,")?;
         } else {
             let whole = if is_whole { ", which moved the readings" } else { "" };
             write!(f, "{whole} by {} {unit}", with_sigma(self.shift * scale, self.sigma * scale))?;

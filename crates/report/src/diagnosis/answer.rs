@@ -43,7 +43,8 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
             "the noise floor is unknown, since too few poses were repeated from the same sides".to_owned()
         }
         Some(floor) => format!(
-            "the rounding of the log alone makes {floor:.3} mm, the noise of the sensor is unknown, since too few poses were repeated from the same sides"
+            "rounding of the log alone accounts for {floor:.3} mm; the noise of the sensor is unknown, since too few poses were \
+             repeated from the same sides"
         ),
         None => format!("the noise floor is unknown, since {}", diagnosis.noise_floor_source),
     };
@@ -74,8 +75,8 @@ fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
     let source = if diagnosis.is_noise_measured() { "" } else { ", which is that of rounding alone" };
     let mut out = vec![
         format!(
-            "the held-out error{left} ({:.3} mm) is {times:.0} times the noise floor ({floor:.3} mm{source}): too much for noise; its cause is \
-             outside the catalogue or in the measurement",
+            "the held-out error{left} ({:.3} mm) is {times:.0} times the noise floor ({floor:.3} mm{source}), too much for noise: its \
+             cause is not in the catalogue, or lies in the measurement",
             diagnosis.fits.extended.cv_rmse_mm
         ),
         format!("what to check: {}", what_to_check(diagnosis.dataset.sensor)),
@@ -93,12 +94,12 @@ fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
 fn what_to_check(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Cable => {
-            "whether the cable runs free and its hook does not slip, whether it was wound in layers or over a pulley, whether the rows come \
-             from sessions with the outlet at different places, and the sensor itself against a known length"
+            "that the cable runs free and its hook holds, that it is wound in one layer and not over a pulley, that the outlet stayed \
+             in one place, and the sensor itself against a known length"
         }
         Sensor::Position | Sensor::Pose => {
-            "whether the tracker read in both faces, whether two targets or nests were read in turn, whether the rows come from sessions with \
-             different sensor frames, and the sensor itself against a known length"
+            "that the tracker read in one face, that one target in one nest was read, that the tracker stayed in one place, and the \
+             sensor itself against a known length"
         }
     }
 }
@@ -142,8 +143,8 @@ fn findings(diagnosis: &Diagnosis) -> Table {
         ],
     );
     table.notes.push(
-        "explains: the part of the readings that nothing else in the model explains, RMS over all rows. identified: better than its \
-         alternatives, and found again in halves of the rows."
+        "explains: the part of the readings that only this cause explains, RMS over all rows. identified: it explains them better \
+         than its alternatives, and is found again in halves of the rows."
             .to_owned(),
     );
     table

@@ -99,8 +99,8 @@ pub(super) fn members(finding: &Finding) -> Table {
         ],
     );
     table.notes.push(
-        "share: of the evidence, if exactly one of these is true. How often the largest share is right was not measured: it is no probability, and no \
-         reason to change a part before the deciding measurement."
+        "share: of the evidence, if exactly one of these is true. It is not a probability: do not replace a part before the deciding \
+         measurement."
             .to_owned(),
     );
     table

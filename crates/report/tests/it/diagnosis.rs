@@ -157,7 +157,7 @@ fn a_remainder_far_above_the_noise_floor_is_a_warning() {
     let (text, flagged) = summary(1.045, 0.004, rounding);
     assert!(flagged && text.contains("[warning] No cause beyond geometry was found"), "{text}");
     assert!(text.contains("is 261 times the noise floor (0.004 mm, which is that of rounding"), "{text}");
-    assert!(text.contains("two targets or nests") && text.contains("several times"), "{text}");
+    assert!(text.contains("one target in one nest") && text.contains("several times"), "{text}");
     // Rounding says nothing of the sensor, whose usual noise explains this.
     let (text, flagged) = summary(0.03, 0.004, rounding);
     assert!(!flagged && text.contains("[ok] No cause beyond geometry was found"), "{text}");

@@ -350,5 +350,5 @@ fn alarms_show_the_digits_that_tell_something() {
         sigma: 4.0,
     };
     let whole = Alarm { shift: 2.83, sigma: 4.46, unit: "mm".to_owned(), parts: vec![part], ..alarm };
-    assert!(whole.to_string().contains("by how much the poses do not tell yet"), "{whole}");
+    assert!(whole.to_string().contains("by an amount that the poses do not show yet"), "{whole}");
 }
