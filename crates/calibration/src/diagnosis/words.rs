@@ -434,7 +434,7 @@ pub fn describe_pattern(cause: &Cause) -> String {
 pub(super) fn remedy_of(cause: &Cause) -> &'static str {
     match cause.kind() {
         CauseKind::Backlash if cause.is_empirical() => {
-            "adjust the gear mesh; the written model does not include it, so keep programs away from poses at which the load changes sides"
+            "adjust the gear mesh; the written model leaves it out, so keep programs away from poses at which the load changes sides"
         }
         CauseKind::ThermalDrift
             if matches!(cause, Cause::Measurement(Disturbance { kind: Kind::Zero, .. })) =>

@@ -327,7 +327,7 @@ fn work_objects_on_one_fixture_are_named_together() {
     plan.placements[0].others.clear();
     plan.placements.push(placement("wobj0", Placement::Shape, 1.5));
     let text = sentences(&plan, &listing).join("\n");
-    assert!(text.contains("against the other by up to 2.131 mm"), "{text}");
+    assert!(text.contains("against each other by up to 2.131 mm"), "{text}");
     plan.placements[1].held = true;
     assert!(!sentences(&plan, &listing).join("\n").contains("belong together"));
 }
