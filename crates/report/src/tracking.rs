@@ -100,7 +100,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         (None, None) => (Status::Good, processed),
     };
     let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
-    let earlier = departed.filter(|_| alarms.is_empty()).and_then(|now| now.told.as_ref());
+    let earlier = departed.filter(|_| alarms.is_empty()).and_then(|now| now.reported.as_ref());
     reasons.extend(earlier.map(|alarm| format!("reported in an earlier run: {alarm}")));
     reasons.extend(departed.filter(|now| now.is_of_shape).map(departure_sentence));
     reasons.extend(departed.and_then(turn_sentence));
@@ -111,7 +111,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
             format!(
                 "{} of {} poses were set aside, since they fit neither the arm nor a detected change: the model follows the others \
                  only; check the sensor and its target, or start a new track",
-                state.accidents, state.poses
+                state.outliers, state.poses
             ),
         );
         (Status::Bad, format!("{headline}; too many poses do not fit"))
@@ -144,7 +144,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     let usual = (!nis.is_empty()).then(|| median(&nis));
     let expected = tracker.expected_median_nis();
     page.push(vec![
-        KeyFigure::new("Poses", state.poses, 0, "").note(format!("{} set aside", state.accidents)),
+        KeyFigure::new("Poses", state.poses, 0, "").note(format!("{} set aside", state.outliers)),
         KeyFigure::new("NIS of the latest poses", usual, 2, "").note(format!(
             "median of the normalised innovation squared; {expected:.1} expected if arm, sensor and noise match the model"
         )),
@@ -213,9 +213,9 @@ fn departure_sentence(now: &Departure) -> String {
          track began with; the uncertainties alone would make {:.3} mm: programs that were corrected with it are off by this much",
         now.rms_mm, now.expected_mm
     );
-    let moved = now.parameters.iter().take(LISTED).map(|(name, unit, by, sigma)| {
-        let (scale, unit) = display_unit(unit);
-        format!("{name} {:+.4} ± {:.4} {unit}", by * scale, sigma * scale)
+    let moved = now.parameters.iter().take(LISTED).map(|moved| {
+        let (scale, unit) = display_unit(&moved.unit);
+        format!("{} {:+.4} ± {:.4} {unit}", moved.name, moved.by * scale, moved.sigma * scale)
     });
     let moved: Vec<String> = moved.collect();
     if let Some([rms_mm, expected_mm]) = now.since_first_poses_mm {
@@ -297,7 +297,7 @@ pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
         "schema": "truegrind.track-report/1",
         "new_poses": fresh,
         "poses": state.poses,
-        "set_aside": state.accidents,
+        "set_aside": state.outliers,
         "new_alarms": alarms,
         "alarms": state.alarms,
         "departure": tracker.departure().map(|now| {

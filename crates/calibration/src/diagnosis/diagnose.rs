@@ -113,7 +113,7 @@ pub fn diagnose(
     let all_causes = &search.stages[2];
     let all_causes = StageErrors { fitted: all_causes.fitted, held_out: all_causes.random };
     let beyond = BeyondNoise::of(&all_causes, dataset.sensor, summary.repeats.as_ref())
-        .beside_rounding(summary.noise_floor.0, dataset.sensor);
+        .less_rounding(summary.noise_floor.0, dataset.sensor);
     let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;
     let handover = Handover {
@@ -193,13 +193,13 @@ fn build_diagnosis(
     measure_again.dedup();
     let (mut findings, pictures): (Vec<_>, Vec<_>) =
         summary.findings.into_iter().map(|s| (s.finding, s.picture)).unzip();
-    let asking = decision::Asking {
+    let question = decision::DecisionQuestion {
         robot,
         sensor: dataset.sensor,
         frames: &search.extended.frames,
         something_else: summary.something_else.as_ref(),
     };
-    asking.complete(&mut findings);
+    question.complete(&mut findings);
     let diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
         verdict: None,

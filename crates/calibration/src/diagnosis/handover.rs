@@ -169,7 +169,7 @@ impl Handover<'_> {
                 let inflation = inflation_from_errors(fitted, rows, &estimated.geometry);
                 // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
                 benefit(fitted, rows, &estimated, &options.arm_tolerance, inflation)
-                    .map(|benefit| benefit.with(beyond_noise.or_scatter(scatter_mm)))
+                    .map(|benefit| benefit.with_unmodelled(beyond_noise.at_least_scatter(scatter_mm)))
             }
         };
         estimated.verdict = judge(&Judged {
@@ -211,8 +211,8 @@ impl Handover<'_> {
         let [all, beside_sensor, own] = [&self.search.stages[2], &arm.beside_sensor, &arm.errors]
             .map(|s| StageErrors { fitted: s.fitted, held_out: s.random });
         let sensor = self.search.context.dataset.sensor;
-        let of_arm = self.beyond_noise.of_part(&all, &beside_sensor, sensor, true);
-        of_arm.of_part(&beside_sensor, &own, sensor, false)
+        let of_arm = self.beyond_noise.of_submodel(&all, &beside_sensor, sensor, true);
+        of_arm.of_submodel(&beside_sensor, &own, sensor, false)
     }
 
     /// Errors of the data sheet, of geometry, and of the written fit.

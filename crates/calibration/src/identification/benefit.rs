@@ -76,7 +76,7 @@ pub struct Benefit {
 
 impl Benefit {
     /// The benefit of an arm that has a further error, corrected or not.
-    pub fn with(self, beyond_noise: BeyondNoise) -> Self {
+    pub fn with_unmodelled(self, beyond_noise: BeyondNoise) -> Self {
         let further_mm = beyond_noise.known_mm().unwrap_or(0.0);
         Self {
             nominal_mm: self.nominal_mm.hypot(further_mm),

@@ -55,7 +55,7 @@ impl BeyondNoise {
     }
 
     /// Beside rounding of the log, which is no error of the arm: its RMS in the readings (mm).
-    pub fn beside_rounding(self, rounding_mm: Option<f64>, sensor: Sensor) -> Self {
+    pub fn less_rounding(self, rounding_mm: Option<f64>, sensor: Sensor) -> Self {
         match (self, rounding_mm) {
             (Self::AtMost(mm), Some(rounding_mm)) => {
                 Self::AtMost((mm.powi(2) - (of_position(sensor) * rounding_mm).powi(2)).max(0.0).sqrt())
@@ -66,7 +66,7 @@ impl BeyondNoise {
 
     /// Of a model that lacks some of the causes with which `self` was judged: `all` are the errors with them, `own` those of the model.
     /// `of_arm`: what it lacks is the arm's, not the sensor's.
-    pub fn of_part(self, all: &StageErrors, own: &StageErrors, sensor: Sensor, of_arm: bool) -> Self {
+    pub fn of_submodel(self, all: &StageErrors, own: &StageErrors, sensor: Sensor, of_arm: bool) -> Self {
         let [all_mm, own_mm] = [all, own].map(|errors| errors.held_out.rmse.min(errors.fitted.rmse));
         if !(own_mm > LACKS * all_mm) {
             return self;
@@ -89,7 +89,7 @@ impl BeyondNoise {
     }
 
     /// At least a scatter of the arm (mm), which is seen without repeated poses too.
-    pub fn or_scatter(self, scatter_mm: f64) -> Self {
+    pub fn at_least_scatter(self, scatter_mm: f64) -> Self {
         match self {
             Self::Known(mm) => Self::Known(mm.max(scatter_mm)),
             Self::AtMost(most_mm) if scatter_mm > 0.0 => {

@@ -236,11 +236,11 @@ pub fn identify(
     report_step("estimating the benefit for programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
     let beyond_noise = BeyondNoise::of(&trained.geometry, observed.dataset.sensor, repeats.as_ref())
-        .beside_rounding(estimated.noise_floor_mm, observed.dataset.sensor);
+        .less_rounding(estimated.noise_floor_mm, observed.dataset.sensor);
     estimated.beyond_noise_mm = beyond_noise.known_mm();
     let benefit = variance_inflation.map(|variance_inflation| {
         benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
-            .map(|benefit| benefit.with(beyond_noise))
+            .map(|benefit| benefit.with_unmodelled(beyond_noise))
     });
     let case = VerdictInputs {
         trained: &trained,

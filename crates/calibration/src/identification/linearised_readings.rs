@@ -40,7 +40,7 @@ pub(super) fn linearise_readings(
     let (p, per) = (problem.parameters(), problem.rows_per_observation());
     let x = &fitted.estimate.x;
     let rotation = fitted.frames.base_from_sensor.rotation;
-    // A scale about the mean reading does not move the sensor frame. Free frames take up where a scale error moves everything; stated ones do not.
+    // A scale about the mean reading does not move the sensor frame. Free frames absorb the common shift of a scale error; stated frames cannot.
     let centre = if has_stated_frames(fitted) { Vector3::zeros() } else { mean_reading(dataset) };
     let errors: Vec<SensorErrors<'_>> =
         laws.iter().map(|&law| SensorErrors::of(law, fitted, dataset)).collect();

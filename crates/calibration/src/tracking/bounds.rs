@@ -9,7 +9,7 @@ const ACCIDENT: f64 = 1e-9;
 const ALARM_DEVIATIONS: f64 = 4.265;
 
 /// The NIS beyond which a pose of `rows` rows is an outlier: the χ² quantile, computed once.
-pub(super) fn accident_bound(rows: usize) -> f64 {
+pub(super) fn outlier_bound(rows: usize) -> f64 {
     use std::sync::OnceLock;
     static CUTS: OnceLock<[f64; 7]> = OnceLock::new();
     let cuts = CUTS

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::alarm::{Alarm, Course, Mount, Part};
-use super::bounds::{accident_bound, window_bound};
+use super::bounds::{outlier_bound, window_bound};
 use super::locate::{ALTERNATIVE_MARGIN, Change, Explanation, Form, Group, GroupChange, locate};
 use super::mounting::Beside;
 use super::state::{Snapshot, extend_region};
@@ -51,7 +51,7 @@ impl Tracker {
         let bound = window_bound(window * per);
         // An isolated outlier is ignored; three or four consecutive ones exceed the bound.
         let counted = |at: usize| match history[at].nis {
-            _ if self.is_lone_accident(at) => per as f64,
+            _ if self.is_lone_outlier(at) => per as f64,
             nis if nis.is_finite() => nis.min(bound / 4.0),
             _ => bound / 4.0,
         };
@@ -73,7 +73,7 @@ impl Tracker {
         // Excess scatter is no change of a parameter, however well one fits a few poses: a change must explain most (0.7) of
         // the window's excess.
         let measured = |at: usize| match history[at].nis {
-            _ if self.is_lone_accident(at) => per as f64,
+            _ if self.is_lone_outlier(at) => per as f64,
             nis if nis.is_finite() => nis,
             _ => bound,
         };
@@ -84,9 +84,9 @@ impl Tracker {
             if let Some(alarm) = self.detect_remount(Beside::ChangedArm) {
                 return Some(alarm);
             }
-            if self.trailing_accidents() > SETTLE {
+            if self.trailing_outliers() > SETTLE {
                 let alarm =
-                    self.unexplained_alarm(Course::Burst, self.trailing_accidents(), [sum, bound], ratio);
+                    self.unexplained_alarm(Course::Burst, self.trailing_outliers(), [sum, bound], ratio);
                 self.state.burst_since = self.state.poses;
                 return alarm;
             }
@@ -218,11 +218,11 @@ impl Tracker {
 
     /// During a burst the only alarm is a remounted target or sensor. The burst ends after [`SETTLE`] consecutive poses that fit.
     fn continue_burst(&mut self) -> Option<Alarm> {
-        let run = self.trailing_accidents();
+        let run = self.trailing_outliers();
         if run > 0 {
             return run.is_multiple_of(SETTLE).then(|| self.detect_remount(Beside::ChangedArm)).flatten();
         }
-        let bound = accident_bound(self.state.sensor.scalars());
+        let bound = outlier_bound(self.state.sensor.scalars());
         let fitting = self.state.history.iter().rev().take_while(|record| record.nis <= bound).count();
         if fitting >= SETTLE {
             self.state.burst_since = 0;
@@ -313,8 +313,8 @@ impl Tracker {
     }
 
     /// Whether a pose of the history is an isolated outlier. After a jump, consecutive poses are outliers.
-    fn is_lone_accident(&self, at: usize) -> bool {
-        let bound = accident_bound(self.state.sensor.scalars());
+    fn is_lone_outlier(&self, at: usize) -> bool {
+        let bound = outlier_bound(self.state.sensor.scalars());
         let aside = |at: Option<usize>| {
             at.and_then(|at| self.state.history.get(at)).is_some_and(|s| !(s.nis <= bound))
         };
@@ -329,7 +329,7 @@ impl Tracker {
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
         self.problem(poses).jacobian(&reference.x, 0..rows, &mut r, &mut j);
         for (pose, record) in poses.iter().enumerate() {
-            if self.is_lone_accident(pose) || !record.nis.is_finite() {
+            if self.is_lone_outlier(pose) || !record.nis.is_finite() {
                 let of_pose = pose * per..(pose + 1) * per;
                 r[of_pose.clone()].fill(0.0);
                 j.chunks_mut(rows).for_each(|column| column[of_pose.clone()].fill(0.0));
@@ -346,7 +346,7 @@ impl Tracker {
         let poses = std::mem::take(&mut self.state.history);
         let problem = self.problem(&poses);
         let single = found.together.is_none();
-        let bound = accident_bound(self.state.sensor.scalars());
+        let bound = outlier_bound(self.state.sensor.scalars());
         // What moves the readings exactly as the sensor does is the sensor: see `compare_changes`.
         let is_same = |change: &Change| {
             !self.parameters[found.best.parameter].is_of_arm()
@@ -383,7 +383,7 @@ impl Tracker {
             }
             let taken = !self.update(&problem, at).set_aside;
             if taken && !(poses[at].nis <= bound) {
-                self.state.accidents = self.state.accidents.saturating_sub(1);
+                self.state.outliers = self.state.outliers.saturating_sub(1);
                 extend_region(&mut self.state.region, &poses[at].joints);
             }
         }
