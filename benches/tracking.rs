@@ -74,7 +74,7 @@ fn main() {
             "{name}: {:.3} ms per pose, {} alarms, {} of {} set aside",
             ms / rows.rows.len() as f64,
             alarms.len(),
-            tracker.state().accidents,
+            tracker.state().outliers,
             rows.rows.len()
         );
     }

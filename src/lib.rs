@@ -76,11 +76,12 @@ pub use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sen
 pub use truegrind_calibration::measurement::import::{
     ImportError, Location as ImportLocation, Options as ImportOptions, read as read_measurements,
 };
+pub use truegrind_calibration::measurement::noise_floor::{self, NoiseFloor};
 pub use truegrind_calibration::measurement::plausibility::{UnitSuspicion, plausibility};
 pub use truegrind_calibration::measurement::sensor::disturbance::Disturbance;
 pub use truegrind_calibration::measurement::simulation::recipe::Recipe;
 pub use truegrind_calibration::measurement::simulation::{RecipeError, SimulatedRow, Simulation};
-pub use truegrind_calibration::measurement::split::{self, NoiseFloor, Split};
+pub use truegrind_calibration::measurement::split::{self, Split};
 
 // Identification, diagnosis and tracking.
 pub use truegrind_calibration::diagnosis::cause::Cause;

@@ -237,3 +237,18 @@ pub fn arm_parameters(model: &Model) -> Vec<Parameter> {
     }
     out
 }
+
+/// Factor to the unit in which a number of `unit` is shown, and that unit: degrees for radians, unchanged otherwise.
+///
+/// ```
+/// use truegrind_arm::parameter::display_unit;
+///
+/// assert_eq!(display_unit("mm"), (1.0, "mm"));
+/// assert_eq!(display_unit("rad"), (1f64.to_degrees(), "°"));
+/// ```
+pub fn display_unit(unit: &str) -> (f64, &str) {
+    match unit {
+        "rad" => (1f64.to_degrees(), "°"),
+        other => (1.0, other),
+    }
+}

@@ -38,6 +38,11 @@ impl Sensor {
         }
     }
 
+    /// Coordinates of its place that a reading has: the length alone of a cable.
+    pub fn axes(self) -> usize {
+        self.scalars().min(3)
+    }
+
     /// Its name in files and reports.
     pub fn name(self) -> &'static str {
         match self {

@@ -30,7 +30,9 @@ use crate::identification::register::register;
 use crate::identification::start::StartError;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};
-use crate::measurement::split::{Split, folds, noise_floor, noise_floor_rad, poses};
+use crate::measurement::noise_floor::{noise_floor, noise_floor_rad};
+use crate::measurement::repeated_poses::poses;
+use crate::measurement::split::{Split, folds};
 
 pub use self::decision::{Decision, FEWEST_POSES, Uncertainty};
 pub use self::error::AcceptError;

@@ -21,7 +21,7 @@
 //! 10. `findings` and `merged`: findings, ranked by their `contribution`, with doubts where a larger fault confounds them
 //!     (`confounding`); `unexplained`: the rest, with what a planner needs of it
 //!     ([`something_else`]); [`decision`]: shares of causes that cannot be told apart, and the measurement that decides. `written_model`: the arm for compensation, fitted beside the
-//!     unknown rest of a sensor's law (`sensor_law`); `in_doubt`: its covariance for uncertain
+//!     unknown rest of a sensor's law (`sensor_discrepancy`); `in_doubt`: its covariance for uncertain
 //!     causes; `sensor_causes`: whether causes of the measurement are fitted with it.
 //! 11. [`finding`], `summary` and [`words`]: the result, as a contract for programs and as sentences for technicians.
 //!
@@ -50,7 +50,7 @@ mod unexplained;
 mod written_model;
 mod in_doubt;
 mod sensor_causes;
-mod sensor_law;
+mod sensor_discrepancy;
 mod contract;
 pub mod newton;
 mod design_effect;
@@ -83,4 +83,5 @@ mod findings;
 mod options;
 mod search;
 mod summary;
+mod handover;
 pub mod diagnose;

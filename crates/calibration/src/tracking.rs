@@ -66,7 +66,7 @@ mod tracker;
 mod turn;
 
 pub use alarm::{Alarm, Course};
-pub use departure::Departure;
+pub use departure::{Departure, MovedParameter};
 pub use error::{StateError, TrackError};
 pub use noise::Overstated;
 pub use options::Options;

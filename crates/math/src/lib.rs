@@ -1,4 +1,4 @@
-//! Mathematical basis: rigid motions, numerical derivatives, statistics, SIMD kernels, cancellable work.
+//! Mathematical basis: rigid motions, numerical derivatives, statistics, SIMD kernels, parts of sentences, cancellable work.
 
 pub mod lanes;
 pub mod gram;
@@ -6,6 +6,7 @@ pub mod axpy;
 pub mod se3;
 pub mod difference;
 pub mod statistics;
+pub mod sentence;
 pub mod distribution;
 pub mod tail;
 pub mod radial;

@@ -21,7 +21,17 @@ pub struct ErrorSummary {
 }
 
 impl ErrorSummary {
-    /// Summary of signed errors.
+    /// Of no errors.
+    pub const UNKNOWN: Self = Self {
+        count: 0,
+        rmse: f64::NAN,
+        mean_absolute: f64::NAN,
+        mean: f64::NAN,
+        standard_deviation: f64::NAN,
+        max: f64::NAN,
+    };
+
+    /// Summary of signed errors; NaN without any.
     ///
     /// ```
     /// use truegrind_math::statistics::ErrorSummary;
@@ -32,12 +42,14 @@ impl ErrorSummary {
     /// assert_eq!((errors.count, errors.max), (2, 0.4));
     /// // An error that is not known is not 0.
     /// assert!(ErrorSummary::of([0.3, f64::NAN]).max.is_nan());
+    /// let none = ErrorSummary::of([]);
+    /// assert!(none.count == 0 && none.rmse.is_nan() && none.max.is_nan());
     /// ```
     pub fn of(errors: impl IntoIterator<Item = f64>) -> Self {
         let values: Vec<f64> = errors.into_iter().collect();
         let n = values.len() as f64;
         if values.is_empty() {
-            return Self::default();
+            return Self::UNKNOWN;
         }
         let mean = values.iter().sum::<f64>() / n;
         let square = values.iter().map(|e| e * e).sum::<f64>();
@@ -58,10 +70,23 @@ pub fn largest(sizes: impl IntoIterator<Item = f64>) -> f64 {
     sizes.into_iter().fold(0.0, |most: f64, size| if size.is_nan() || size > most { size } else { most })
 }
 
-/// Mean and standard deviation (n − 1) of a list.
+/// Mean and standard deviation (n − 1) of a list; NaN for an empty one.
 pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let summary = ErrorSummary::of(values.iter().copied());
     (summary.mean, summary.standard_deviation)
+}
+
+/// Root mean square; `None` for an empty list.
+///
+/// ```
+/// use truegrind_math::statistics::rms;
+///
+/// assert_eq!(rms(&[3.0, -4.0]), Some(12.5_f64.sqrt()));
+/// assert_eq!(rms(&[]), None);
+/// ```
+pub fn rms(values: &[f64]) -> Option<f64> {
+    let square = values.iter().map(|v| v * v).sum::<f64>();
+    (!values.is_empty()).then(|| (square / values.len() as f64).sqrt())
 }
 
 /// Median; `None` for an empty list. Non-finite values are sorted last.

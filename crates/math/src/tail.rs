@@ -75,3 +75,9 @@ pub fn chi_square_tail(value: f64, freedom: usize) -> f64 {
 pub fn normal_two_sided(value: f64) -> f64 {
     chi_square_tail(value * value, 1)
 }
+
+/// Φ(`value`), the standard normal distribution function.
+pub fn normal_cdf(value: f64) -> f64 {
+    let tail = 0.5 * normal_two_sided(value);
+    if value < 0.0 { tail } else { 1.0 - tail }
+}

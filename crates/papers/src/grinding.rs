@@ -338,7 +338,7 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
     let mut case = GrindingCase {
         after: None,
         refused: 0,
-        held_out: ErrorSummary::default(),
+        held_out: ErrorSummary::UNKNOWN,
         termination: Termination::NotFinite,
         failure: None,
     };

@@ -45,6 +45,7 @@ use truegrind_calibration::identification::rounding;
 use truegrind_calibration::identification::solver::{Family, Run, SOLVERS, Scope, Solver, SolverError};
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::noise_floor;
 use truegrind_calibration::measurement::split::{self, Split};
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::least_squares::{Factorisation, lm};
@@ -316,11 +317,7 @@ fn enough(
     rows: usize,
     nominal: &Model,
 ) -> Result<(), ExperimentError> {
-    let per = match dataset.sensor {
-        Sensor::Cable => 1,
-        Sensor::Position => 3,
-        Sensor::Pose => 6,
-    };
+    let per = dataset.sensor.scalars();
     let share = methods.protocol.held_out;
     let parameters = link_parameters(nominal).len() + frame_parameters(dataset).len();
     let held_out = (rows as f64 * share).round() as usize;
@@ -523,7 +520,7 @@ fn parameters_of(case: &Prepared, result: &MethodResult) -> Option<ParameterTabl
 }
 
 fn noise_floor(observed: &Observations, case: &Prepared, sensor_sigma_mm: f64) -> Option<f64> {
-    if let Some(floor) = split::noise_floor(&observed.dataset) {
+    if let Some(floor) = noise_floor::noise_floor(&observed.dataset) {
         return Some(floor.sigma_mm);
     }
     let registered = &case.registered;
@@ -531,7 +528,7 @@ fn noise_floor(observed: &Observations, case: &Prepared, sensor_sigma_mm: f64) -
         rounding::angle_shares(&observed.dataset, &registered.model, &registered.frames, &observed.angles);
     let mean = shares.iter().map(|s| s.0).sum::<f64>() / shares.len().max(1) as f64;
     // The error of a position is the norm of its three coordinates.
-    let axes = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let axes = observed.dataset.sensor.axes() as f64;
     let variance = axes * (mean + sensor_sigma_mm * sensor_sigma_mm);
     (variance > 0.0).then(|| variance.sqrt())
 }

@@ -133,7 +133,7 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
     }
     if let Some(coverage) = found.coverage.filter(|coverage| coverage.share() < LEAST_COVERAGE) {
         reasons.push(format!(
-            "the poses turn joint {} through {:.0}° of the {:.0}° over which the arm was measured: nothing was tested beyond",
+            "joint {} was tested over {:.0}° of the {:.0}° that the fit covers: nothing is known beyond",
             coverage.joint + 1,
             coverage.tested_deg,
             coverage.fitted_deg
@@ -160,8 +160,8 @@ fn tested(found: &Acceptance) -> String {
     let tested = &found.tested;
     let [x, y, z] = tested.volume_mm;
     let volume = format!(
-        "tested: a volume of {x:.0} × {y:.0} × {z:.0} mm; at its poses, links of ordinary tolerance move the target {:.1} % as much as over \
-         the poses of the fit, apart from placement",
+        "tested: a volume of {x:.0} × {y:.0} × {z:.0} mm; its poses show {:.1} % of what the poses of the fit show of errors of the \
+         links, placement excluded",
         100.0 * tested.share
     );
     if tested.is_enough() {

@@ -344,7 +344,7 @@ pub fn document(rows: &[Row]) -> Document {
         KeyFigure::new("Corrected", changed + flagged, 0, "")
             .note(format!("of {motions} motions, {flagged} of them flagged")),
         KeyFigure::new("Largest before", largest(|row| row.before_mm), 3, "mm")
-            .note("of the corrected motions; in programs without any, of all motions"),
+            .note("before correction: of corrected motions, or of all in programs without any"),
         KeyFigure::new("Expected after", largest(|row| row.expected_mm), 3, "mm")
             .note("1σ: largest of the corrected motions"),
         KeyFigure::new("To check", rows.iter().filter(|row| !row.is_clean()).count(), 0, "")

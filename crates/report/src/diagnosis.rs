@@ -14,8 +14,9 @@ use truegrind_calibration::diagnosis::diagnose::Diagnosed;
 use truegrind_calibration::diagnosis::finding::{Diagnosis, Finding};
 use truegrind_calibration::diagnosis::picture::Picture;
 use truegrind_calibration::measurement::dataset::Dataset;
+use truegrind_math::sentence::capitalised;
 pub(crate) use words::place;
-use words::{doubts, reasons, remaining, sentence, title};
+use words::{doubts, reasons, remaining, title};
 
 /// The whole page.
 pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
@@ -79,7 +80,7 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
 
 /// What to do about a finding, its picture, and its statistics.
 fn section(page: &mut Document, finding: &Finding, picture: Option<&Picture>) {
-    page.paragraph(format!("{} ({}).", sentence(&finding.cause), words::confidence(finding)));
+    page.paragraph(format!("{} ({}).", capitalised(&finding.cause), words::confidence(finding)));
     let mut points = doubts(finding);
     let decision = finding.decided_by.as_ref().filter(|decision| **decision != finding.remedy);
     points.extend(decision.map(|decision| format!("what decides: {decision}")));
@@ -145,7 +146,7 @@ fn key_figures(found: &Diagnosed) -> Vec<KeyFigure> {
             fits.geometric.cv_regions_rmse_mm
         )),
         KeyFigure::new("Noise floor", diagnosis.noise_floor_mm, 3, "mm")
-            .note(diagnosis.noise_floor_source.clone()),
+            .note(diagnosis.noise_floor_source.to_string()),
     ]);
     figures
 }
@@ -190,7 +191,7 @@ fn drawn(picture: &Picture) -> String {
 fn caption(picture: &Picture) -> String {
     format!(
         "{} against {}, without and with this cause, everything else fitted.",
-        sentence(&picture.y.0),
+        capitalised(&picture.y.0),
         picture.x.0
     )
 }

@@ -268,8 +268,8 @@ fn programs_after(benefit: &Benefit) -> KeyFigure {
             .note(format!("expected RMS deviation; better with a probability of {probability}"));
     }
     KeyFigure::new(after, format!("{least} to {most}"), 3, "mm").note(format!(
-        "expected RMS deviation, the more of what the readings still deviate is the arm's and not noise; better with a probability of \
-         {probability}"
+        "expected RMS deviation: the larger, the more of the unexplained rest is the arm's and not noise; better with a probability \
+         of {probability}"
     ))
 }
 

@@ -66,14 +66,6 @@ impl Precision {
     }
 }
 
-/// Factor and unit for display: degrees for radians, unchanged otherwise.
-pub fn handy(unit: &str) -> (f64, &str) {
-    match unit {
-        "rad" => (1f64.to_degrees(), "°"),
-        unit => (1.0, unit),
-    }
-}
-
 /// The shortest text that parses to the same number, with an exponent if that is shorter.
 pub(super) fn exact(value: f64) -> String {
     let size = value.abs();

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 
 use super::table::{Column, Table};
-use truegrind_calibration::identification::verdict::percent_of;
+use truegrind_calibration::identification::verdict::{LEAST_PERCENT, MOST_PERCENT, percent_of};
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
@@ -102,7 +102,8 @@ fn sentence(placement: &ObjectPlacement, what: &str) -> String {
     }
     let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(
-        "{named}: only the shape is corrected; {known}; correcting the placement too would make the path worse with a probability of {}; {remedy}--placement absolute corrects it anyway",
+        "{named}: only the shape is corrected; {known}; correcting the placement too would make the path worse with a probability of \
+         {}; {remedy}--placement absolute corrects it anyway",
         percent_of(*probability_of_harm)
     )
 }
@@ -239,11 +240,11 @@ pub fn risk(plan: &Plan) -> Option<String> {
     ))
 }
 
-/// A probability as an upper bound.
+/// "At most 3.0 %", or the bound that [`percent_of`] states.
 fn at_most(probability: f64) -> String {
+    let bounds = LEAST_PERCENT..=MOST_PERCENT;
     let percent = percent_of(probability);
-    // At both ends it is a bound by itself.
-    if (0.001..=0.999).contains(&probability) { format!("at most {percent}") } else { percent }
+    if bounds.contains(&(100.0 * probability)) { format!("at most {percent}") } else { percent }
 }
 
 fn remedy_json(remedy: &Remedy, what: &str) -> Value {

@@ -202,12 +202,12 @@ fn tells_little(field: &FieldUncertainty, poses: usize) -> Option<String> {
     let (count, left_mm) = field.needed?;
     Some(if left_mm > 0.5 * field.before_mm {
         format!(
-            "these poses tell little, and so do more of them ({count}: {left_mm:.3} mm): the error changes within shorter distances than any plan \
-             of poses resolves. Measure along the programs to be corrected instead"
+            "these poses show little, and so would more of them ({count}: {left_mm:.3} mm): the error varies over shorter distances \
+             than poses can sample. Measure along the programs to be corrected instead"
         )
     } else {
         format!(
-            "these {poses} poses tell little: {count} poses would leave {left_mm:.3} mm (--poses {count})"
+            "these {poses} poses show little: {count} poses would leave {left_mm:.3} mm (--poses {count})"
         )
     })
 }

@@ -3,10 +3,11 @@
 use serde_json::{Value, json};
 
 use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
-use super::number::handy;
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
+use truegrind_arm::parameter::display_unit;
+use truegrind_calibration::tracking::alarm::Mount;
 use truegrind_calibration::tracking::state::ConsumedFile;
 use truegrind_calibration::tracking::{Alarm, Departure, Tracker};
 use truegrind_math::statistics::median;
@@ -99,8 +100,8 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         (None, None) => (Status::Good, processed),
     };
     let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
-    let earlier = departed.filter(|_| alarms.is_empty()).and_then(|now| now.told.as_ref());
-    reasons.extend(earlier.map(|alarm| format!("told in an earlier run: {alarm}")));
+    let earlier = departed.filter(|_| alarms.is_empty()).and_then(|now| now.reported.as_ref());
+    reasons.extend(earlier.map(|alarm| format!("reported in an earlier run: {alarm}")));
     reasons.extend(departed.filter(|now| now.is_of_shape).map(departure_sentence));
     reasons.extend(departed.and_then(turn_sentence));
     reasons.extend(which_moved(alarms));
@@ -110,7 +111,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
             format!(
                 "{} of {} poses were set aside, since they fit neither the arm nor a detected change: the model follows the others \
                  only; check the sensor and its target, or start a new track",
-                state.accidents, state.poses
+                state.outliers, state.poses
             ),
         );
         (Status::Bad, format!("{headline}; too many poses do not fit"))
@@ -141,10 +142,9 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     let nis: Vec<f64> = state.history.iter().map(|s| s.nis).filter(|n| n.is_finite()).collect();
     // A single pose after remounting may have a NIS of a million, which would dominate the mean.
     let usual = (!nis.is_empty()).then(|| median(&nis));
-    let degrees = tracker.state().sensor.scalars() as f64;
-    let expected = degrees * (1.0 - 2.0 / (9.0 * degrees)).powi(3);
+    let expected = tracker.expected_median_nis();
     page.push(vec![
-        KeyFigure::new("Poses", state.poses, 0, "").note(format!("{} set aside", state.accidents)),
+        KeyFigure::new("Poses", state.poses, 0, "").note(format!("{} set aside", state.outliers)),
         KeyFigure::new("NIS of the latest poses", usual, 2, "").note(format!(
             "median of the normalised innovation squared; {expected:.1} expected if arm, sensor and noise match the model"
         )),
@@ -178,10 +178,11 @@ fn turn_headline(now: &Departure) -> String {
 fn turn_sentence(now: &Departure) -> Option<String> {
     let turn = now.turn.as_ref().filter(|turn| turn.is_significant)?;
     Some(format!(
-        "since the first poses, arm and sensor have turned against each other by {:.4} ± {:.4}° about axis 1, which is {:.3} mm RMS at the target. \
-         Joint 1 lost its zero, or the base turned: then programs on parts that stand beside the arm are off by as much. Or the sensor was \
-         moved about axis 1: then they are right. The readings are the same. To tell: read three points fixed to the floor; if they \
-         moved for the sensor, it was the sensor. Else read points on the arm's foot; if they moved, it was the base, if not, joint 1",
+        "since the first poses, arm and sensor have turned against each other by {:.4} ± {:.4}° about axis 1, which is {:.3} mm RMS \
+         at the target. Either joint 1 lost its zero or the base turned, and programs on parts next to the arm are off by this; or \
+         the sensor was moved about axis 1, and they are right. The readings cannot tell. Measure three points fixed to the floor: \
+         if they moved for the sensor, it was the sensor. Else measure points on the arm's foot: if they moved, it was the base, if \
+         not, joint 1",
         turn.angle_rad.to_degrees(),
         turn.sigma_rad.to_degrees(),
         turn.rms_mm
@@ -190,15 +191,16 @@ fn turn_sentence(now: &Departure) -> Option<String> {
 
 /// What readings cannot tell of the new changes, and what to measure.
 fn which_moved(alarms: &[Alarm]) -> Vec<String> {
-    let any = |name: &str| alarms.iter().any(|alarm| alarm.parameter == name);
-    let target = any("the touched point").then(|| {
+    let any = |mount: Mount| alarms.iter().any(|alarm| alarm.is_of(mount));
+    let target = any(Mount::Target).then(|| {
         "the touched point: the arm in the model for programs stays as it was. A changed last link or a lost zero of joint 6 would move the \
          readings alike; if the reflector was neither exchanged nor bumped, check the mark of joint 6, and touch a known point with the tool"
             .to_owned()
     });
-    let sensor = any("the sensor against the arm's base").then(|| {
-        "sensor or base: the readings tell only that one moved against the other. Read three points fixed to the floor: if they moved for the \
-         sensor, it was the sensor, and the programs are right; if not, it was the base, and programs on parts beside the arm are off"
+    let sensor = any(Mount::Sensor).then(|| {
+        "sensor or base: the readings show only that one moved against the other. Measure three points fixed to the floor: if they \
+         moved for the sensor, it was the sensor, and the programs are right; if not, it was the base, and programs on parts next to \
+         the arm are off"
             .to_owned()
     });
     target.into_iter().chain(sensor).collect()
@@ -207,13 +209,13 @@ fn which_moved(alarms: &[Alarm]) -> Vec<String> {
 /// How far the arm has moved, and its parameters that moved most.
 fn departure_sentence(now: &Departure) -> String {
     let mut out = format!(
-        "over the measured region, and apart from the placement of base and target, the arm is {:.3} mm RMS from the model that the track \
-         began with, where the uncertainties let expect {:.3} mm: programs that were corrected with it are off by as much",
+        "over the measured region, and apart from the placement of base and target, the arm is {:.3} mm RMS from the model that the \
+         track began with; the uncertainties alone would make {:.3} mm: programs that were corrected with it are off by this much",
         now.rms_mm, now.expected_mm
     );
-    let moved = now.parameters.iter().take(LISTED).map(|(name, unit, by, sigma)| {
-        let (scale, unit) = handy(unit);
-        format!("{name} {:+.4} ± {:.4} {unit}", by * scale, sigma * scale)
+    let moved = now.parameters.iter().take(LISTED).map(|moved| {
+        let (scale, unit) = display_unit(&moved.unit);
+        format!("{} {:+.4} ± {:.4} {unit}", moved.name, moved.by * scale, moved.sigma * scale)
     });
     let moved: Vec<String> = moved.collect();
     if let Some([rms_mm, expected_mm]) = now.since_first_poses_mm {
@@ -237,16 +239,17 @@ fn noise_sentences(tracker: &Tracker) -> Vec<String> {
     });
     let overstated = tracker.overstated_noise().map(|noise| {
         format!(
-            "remark: the readings scatter by {:.3} mm along each axis, but the track counts with {:.3} mm (--sigma, or what the model left \
-             over): a sudden change that moves the readings by less than about {:.2} mm is not told; a new track with --sigma {:.3} is finer",
+            "remark: the readings scatter by {:.3} mm along each axis, but the track counts with {:.3} mm (--sigma, or what the model \
+             left over): a sudden change that moves the readings by less than about {:.2} mm goes unnoticed; a new track with \
+             --sigma {:.3} would see it",
             noise.seen_mm, noise.sigma_mm, noise.smallest_change_mm, 1.25 * noise.seen_mm
         )
     });
     let worse = tracker.worse_fit().map(|ratio| {
         format!(
-            "the latest readings fit {ratio:.1} times less well than the first ones, though within the noise that the track counts with: arm, \
-             sensor or target moved a little, or the poses lie elsewhere; if they lie as before, begin a new track with a --sigma of what the \
-             first ones scattered, which tells what moved"
+            "the latest readings fit {ratio:.1} times less well than the first ones, though within the noise that the track counts \
+             with: arm, sensor or target moved a little, or the poses lie elsewhere; if they lie as before, begin a new track with \
+             --sigma set to the scatter of the first ones, to find out what moved"
         )
     });
     worse.into_iter().chain(replaced).chain(overstated).collect()
@@ -267,7 +270,7 @@ pub fn table(tracker: &Tracker) -> Table {
     );
     let sigmas = tracker.sigmas();
     for ((parameter, value), sigma) in tracker.parameters().iter().zip(tracker.deviations()).zip(sigmas) {
-        let (scale, unit) = handy(parameter.unit());
+        let (scale, unit) = display_unit(parameter.unit());
         table.push([
             parameter.to_string().into(),
             unit.into(),
@@ -294,7 +297,7 @@ pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
         "schema": "truegrind.track-report/1",
         "new_poses": fresh,
         "poses": state.poses,
-        "set_aside": state.accidents,
+        "set_aside": state.outliers,
         "new_alarms": alarms,
         "alarms": state.alarms,
         "departure": tracker.departure().map(|now| {

@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, Vector3};
 
 use crate::identification::calibration::{CalibrationProblem, Frames};
-use crate::identification::placement::{Placed, fill, place};
+use crate::identification::rigid_motion_columns::{Placed, fill, place};
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::condition::Condition;

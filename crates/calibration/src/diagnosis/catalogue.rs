@@ -15,9 +15,9 @@ use crate::identification::calibration::{
     Frames, LoadedRows, joint_rotations, sensor_shifts, sensor_turns, torques_under,
 };
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use crate::measurement::repeated_poses::poses;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault, Overturning, Pole};
-use crate::measurement::split;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
@@ -297,7 +297,7 @@ const POSES_PER_KNOT: usize = 10;
 pub fn fine_maps(subject: &Subject<'_>) -> Vec<Vec<Arc<Candidate>>> {
     let dataset = &subject.observed.dataset;
     let needed = POSES_PER_KNOT * FINE[1].0;
-    let all = dataset.rows.len() >= needed && split::poses(dataset).len() >= needed;
+    let all = dataset.rows.len() >= needed && poses(dataset).len() >= needed;
     let map = |joint: usize, knots: usize| {
         let effect = Effect::GearMap(ErrorMap { joint, knots_rad: vec![0.0; knots] });
         Arc::new(Candidate::arm(effect, dataset, subject.nominal))

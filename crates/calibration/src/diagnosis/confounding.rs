@@ -101,13 +101,13 @@ impl Confounding<'_> {
         let (whole, sensor) = (self.contributions.rms_mm(causes), self.sensor_fault_rms_mm());
         if own < rough {
             out.push(format!(
-                "beyond geometry it explains only {own:.4} mm, less than the {rough:.4} mm of a fault whose exact law is unknown: it might be \
-                 a residue of that"
+                "beyond geometry it explains only {own:.4} mm, less than the {rough:.4} mm of another fault whose exact form is \
+                 unknown: it may be a part of that one"
             ));
         } else if smooth && whole < sensor {
             out.push(format!(
-                "it contributes {whole:.4} mm, less than the {sensor:.4} mm of a sensor fault whose exact law is unknown: it might be a residue \
-                 of that"
+                "it contributes {whole:.4} mm, less than the {sensor:.4} mm of a sensor fault whose exact form is unknown: it may be \
+                 a part of that one"
             ));
         }
         if own < self.excess_over_noise_mm {
@@ -140,8 +140,8 @@ impl Confounding<'_> {
         let moved = self.contributions.movement_rms_mm(causes);
         (moved > COMPENSATED * own).then(|| {
             format!(
-                "it would move the readings by {moved:.4} mm and explains only {own:.4} mm, since links and frames take up the rest: its size may \
-                 be what cancels theirs"
+                "it moves the readings by {moved:.4} mm but explains only {own:.4} mm, since links and frames cancel the rest: its \
+                 size is not reliable"
             )
         })
     }

@@ -3,15 +3,16 @@
 
 use super::cause_kind::CauseKind;
 use super::extension::{Extended, Freedom, Subject, fit};
-use super::finding::{Confidence, Finding, FoundParameter, Gain, ROUNDING_ALONE};
+use super::finding::{Confidence, Finding, FoundParameter, Gain, NoiseFloorSource};
 use super::preparation::Prepared;
 use super::selection::BLOCKS;
 use super::validation::{StageError, Validation};
 use super::words;
 use crate::identification::fit::Observations;
 use crate::identification::rounding::{NotFused, angle_shares, rounding_floor_mm};
-use crate::measurement::dataset::{Dataset, Sensor};
-use crate::measurement::split;
+use crate::measurement::dataset::Dataset;
+use crate::measurement::noise_floor::NoiseFloor;
+use crate::measurement::repeated_poses;
 
 /// Rounding is a finding when it causes more than this share of the variance of the residual, that of geometry or of the extended
 /// model: a larger fault does not hide it.
@@ -32,7 +33,7 @@ pub(super) fn rounding_finding(
     let step = dataset.angle_step_rad.filter(|_| !few_poses)?;
     let logged = &prepared.logged;
     let shares = angle_shares(&logged.dataset, &geometric.model, &geometric.frames, &logged.angles);
-    let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let coordinates = dataset.sensor.axes() as f64;
     let share = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
     let raw = Subject { observed: logged, ..*subject };
     let unsharpened = fit(&raw, &[], Freedom::All, Some(geometric));
@@ -56,9 +57,9 @@ pub(super) fn rounding_finding(
             let available =
                 matches!(why, NotFused::Nothing) && dataset.rows.iter().all(|r| r.readout_mm().is_some());
             let read_out = match why {
-                _ if available => "the read-out was not fused with them (--raw-columns)",
-                NotFused::Nothing => "available is no read-out to fuse with them",
-                NotFused::Mismatch { .. } => "the read-out contradicts them, so it was not fused with them",
+                _ if available => "the readout was not fused with them (--raw-columns)",
+                NotFused::Nothing => "there is no readout to fuse with them",
+                NotFused::Mismatch { .. } => "the readout contradicts them, so it was not fused with them",
             };
             (
                 Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: before },
@@ -197,7 +198,7 @@ const POSES_OF_AN_ANGLE: usize = 4;
 /// A note on joints that stood at a few single angles only, as on a grid of poses. Rows that are held out stand at the same angles,
 /// so that no held-out error shows what a gear does between them.
 pub(super) fn single_angles(dataset: &Dataset) -> Option<String> {
-    let poses = split::poses(dataset).len();
+    let poses = repeated_poses::poses(dataset).len();
     let joints: Vec<String> = (0..6)
         .filter_map(|joint| {
             let mut angles: Vec<f64> = dataset.rows.iter().map(|row| row.joints[joint]).collect();
@@ -216,8 +217,8 @@ pub(super) fn single_angles(dataset: &Dataset) -> Option<String> {
         .collect();
     (!joints.is_empty()).then(|| {
         format!(
-            "some joints stood at a few single angles only ({}): held-out errors are those at these angles, and what a gear does between them \
-             was not measured; measure further poses at other angles before programs move there",
+            "some joints were measured at a few angles only ({}): held-out errors hold at these angles, and what a gear does between \
+             them is unknown; measure poses at other angles before programs move there",
             joints.join(", ")
         )
     })
@@ -225,19 +226,17 @@ pub(super) fn single_angles(dataset: &Dataset) -> Option<String> {
 
 /// The noise floor (mm) of sensor and rounding, and its source.
 pub(super) fn noise_floor(
-    repeated: &Option<split::NoiseFloor>,
+    repeated: &Option<NoiseFloor>,
     subject: &Subject<'_>,
     extended: &Extended,
-) -> (Option<f64>, String) {
+) -> (Option<f64>, NoiseFloorSource) {
     if let Some(floor) = repeated {
-        return (
-            Some(floor.sigma_mm),
-            format!("{} repeated poses, {} degrees of freedom", floor.poses, floor.freedom),
-        );
+        let source = NoiseFloorSource::Repeats { poses: floor.poses, freedom: floor.freedom };
+        return (Some(floor.sigma_mm), source);
     }
     let Observations { dataset, angles } = subject.observed;
     match rounding_floor_mm(dataset, &extended.model, &extended.frames, angles) {
-        Some(floor) => (Some(floor), ROUNDING_ALONE.to_owned()),
-        None => (None, "too few poses were repeated and nothing is rounded".to_owned()),
+        Some(floor) => (Some(floor), NoiseFloorSource::RoundingAlone),
+        None => (None, NoiseFloorSource::Unknown),
     }
 }

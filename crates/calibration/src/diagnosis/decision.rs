@@ -150,14 +150,14 @@ fn in_words(effect: CauseKind) -> Option<&'static str> {
 }
 
 /// What the sentence of a decision needs.
-pub(super) struct Asking<'a> {
+pub(super) struct DecisionQuestion<'a> {
     pub(super) robot: &'a str,
     pub(super) sensor: Sensor,
     pub(super) frames: &'a Frames,
     pub(super) something_else: Option<&'a SomethingElse>,
 }
 
-impl Asking<'_> {
+impl DecisionQuestion<'_> {
     /// Adds members and decisions to the findings, which are in their final order.
     pub(super) fn complete(&self, findings: &mut [Finding]) {
         let sure = findings.iter().filter(|finding| finding.confidence == Confidence::Identified);

@@ -20,8 +20,8 @@ use super::extension::{Extended, Subject, with_robust_weights};
 use super::serial_correlation::prewhiten_transposed;
 use crate::identification::calibration::CalibrationProblem;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use crate::measurement::repeated_poses::pose_of_rows;
 use crate::measurement::sensor::disturbance::sag_mm;
-use crate::measurement::split;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::axpy::{Entry, add_sparse_product};
@@ -192,7 +192,7 @@ impl Linear {
             by_scale,
             by_sag,
             mm,
-            poses: split::pose_of_rows(dataset),
+            poses: pose_of_rows(dataset),
         });
         let observations = dataset.rows.len();
         Self {

@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 use crate::measurement::dataset::Dataset;
-use crate::measurement::split;
+use crate::measurement::repeated_poses::pose_of_rows;
 
 /// Fewest repeated readings for an estimate of the variance within poses.
 const KNOWN: usize = 20;
@@ -50,7 +50,7 @@ impl VarianceComponents {
 impl RepeatedPoses {
     /// The poses of a data set; `None` for too few repeated readings.
     pub(super) fn of(dataset: &Dataset) -> Option<Self> {
-        let pose_of_row = split::pose_of_rows(dataset);
+        let pose_of_row = pose_of_rows(dataset);
         let poses = pose_of_row.iter().max().map_or(0, |p| p + 1);
         (pose_of_row.len() >= poses + KNOWN).then_some(Self { pose_of_row, poses })
     }

@@ -4,48 +4,32 @@ use super::cause::Cause;
 use super::cause_kind::CauseKind;
 use super::data_quality::single_angles;
 use super::decision;
-use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
-use super::in_doubt::{self, MissingError};
-use super::joint_scatter::JointScatter;
-use super::link_geometry::LINK_Z;
+use super::handover::{HandedOver, Handover};
 use super::merged;
 pub use super::options::Options;
 use super::picture::Picture;
 use super::preparation::{Prepared, prepare};
 use super::residual_tests;
 use super::search::{Confirmed, Search, SearchContext};
-use super::selection::contains_cause;
-use super::sensor_causes::{self, probability_worse};
 use super::summary::{self, Summary};
 use super::testability::not_testable;
-use super::validation::{StageError, nominal};
-use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
-use crate::identification::benefit::{Benefit, benefit, widen_by_scale};
+use super::validation::nominal;
+use crate::identification::benefit::Benefit;
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{
-    Fitted, Observations, WRONG_ORIENTATION_RAD, frame_parameters, median_orientation_error,
-};
-use crate::identification::identify::{
-    self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition,
-    parameter_table, with_sigma_in_region,
+    Observations, WRONG_ORIENTATION_RAD, frame_parameters, median_orientation_error,
 };
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
-use crate::identification::unseen_target::unseen_target;
-use crate::identification::verdict::{CONVERGED, VerdictBuilder};
-use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::dataset::Dataset;
 use crate::measurement::split;
-use nalgebra::DMatrix;
 use truegrind_arm::effect::Effect;
-use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
+use truegrind_arm::estimated::{Estimated, StageErrors};
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::arm_parameters;
-use truegrind_arm::region::Region;
-use truegrind_estimation::estimate::Estimate;
-use truegrind_estimation::problem::Problem;
 
 /// A diagnosis with its fits.
 #[derive(Debug, Clone)]
@@ -129,38 +113,19 @@ pub fn diagnose(
     let all_causes = &search.stages[2];
     let all_causes = StageErrors { fitted: all_causes.fitted, held_out: all_causes.random };
     let beyond = BeyondNoise::of(&all_causes, dataset.sensor, summary.repeats.as_ref())
-        .beside_rounding(summary.noise_floor.0, dataset.sensor);
+        .less_rounding(summary.noise_floor.0, dataset.sensor);
     let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;
-    let of_all = thin_rows.is_none().then_some(&confirmed.outcome.discrepancy);
-    let certain_model = certain_model(&search, &certain, of_all);
-    let beside_sensor = certain_model.1;
-    let ((written, written_stage), chance) = without_measurement_causes(&search, certain_model, of_all);
-    let written = if written.causes.is_empty() {
-        as_identified(&context, robot, &written, of_all).unwrap_or(written)
-    } else {
-        written
-    };
-    diagnosis.notes.extend(chance.map(|chance| {
-        format!(
-            "the written arm leaves the causes in the measurement out of its fit, since with them its links might be worse (probability {:.0} %, \
-             at most {:.0} % are allowed)",
-            100.0 * chance,
-            100.0 * sensor_causes::MOST_PROBABILITY
-        )
-    }));
-    let handing = Handing {
+    let handover = Handover {
         search: &search,
-        discrepancy: of_all,
+        robot,
+        discrepancy: thin_rows.is_none().then_some(&confirmed.outcome.discrepancy),
         scatter,
-        noise: Noise { floor_mm: diagnosis.noise_floor_mm, beyond },
-        beside_sensor,
+        noise_floor_mm: diagnosis.noise_floor_mm,
+        beyond_noise: beyond,
         few_poses,
     };
-    let handed = with_uncertain_causes(&search, &written, of_all);
-    let with_causes =
-        handing.estimated(robot, [&written, handed.as_ref().unwrap_or(&written)], &written_stage);
-    let (estimated, benefit) = handing.or_geometry_alone(with_causes, robot, &mut diagnosis.notes);
+    let HandedOver { estimated, benefit } = handover.arm(&certain, &mut diagnosis.notes);
     diagnosis.verdict = Some(estimated.verdict.clone());
     let (geometric, set_aside) = (search.geometric, search.set_aside);
     Ok(Diagnosed {
@@ -186,201 +151,6 @@ fn few_poses_note(dataset: &Dataset, needed: usize) -> String {
     )
 }
 
-/// What is needed to hand over an arm.
-struct Handing<'a> {
-    search: &'a Search<'a>,
-    discrepancy: Option<&'a Discrepancy>,
-    scatter: Option<JointScatter>,
-    noise: Noise,
-    /// Errors of the written arm beside all causes of the measurement: what it lacks beyond the errors with all causes is the arm's, and
-    /// what a fit without the causes of the measurement lacks beyond that is not.
-    beside_sensor: StageError,
-    /// Says that there are too few poses.
-    few_poses: Option<String>,
-}
-
-/// What is known of the noise.
-#[derive(Clone, Copy)]
-struct Noise {
-    /// The noise floor of sensor and rounding (mm).
-    floor_mm: Option<f64>,
-    /// What all causes leave beyond the scatter of repeated poses.
-    beyond: BeyondNoise,
-}
-
-impl Handing<'_> {
-    /// The arm of a fit for compensation, with its expected benefit; `handed` is the same with uncertain causes. What both lack stands in
-    /// the covariance.
-    fn estimated(
-        &self,
-        robot: &str,
-        [written, handed]: [&Extended; 2],
-        stage: &StageError,
-    ) -> (Estimated, Option<Benefit>) {
-        let search = self.search;
-        let mut missing = in_doubt::missing_errors(&search.context.subject, &search.extended, handed);
-        // What a fault of the joint without a file leaves is known better than its scatter.
-        let scatter = self.scatter.as_ref().map(MissingError::scatter);
-        missing
-            .extend(scatter.filter(|scatter| !missing.iter().any(|other| other.joint() == scatter.joint())));
-        let [before, geometry, _] = search.stages;
-        let mut fits = [written, handed].map(Fitted::from);
-        if let Some(sigma) = search.context.options.arm_tolerance.scale {
-            let rows = &search.context.subject.observed.dataset;
-            fits.iter_mut().for_each(|fit| widen_by_scale(fit, rows, sigma));
-        }
-        let stages = [before, geometry, *stage];
-        let few_poses = self.few_poses.as_deref();
-        let [all, beside_sensor, own] = [&search.stages[2], &self.beside_sensor, stage]
-            .map(|s| StageErrors { fitted: s.fitted, held_out: s.random });
-        let sensor = search.context.dataset.sensor;
-        let of_arm = self.noise.beyond.of_part(&all, &beside_sensor, sensor, true);
-        let noise = Noise { beyond: of_arm.of_part(&beside_sensor, &own, sensor, false), ..self.noise };
-        let scatter_mm = self.scatter.as_ref().map_or(0.0, JointScatter::rms_mm);
-        estimated(search, robot, (&fits, missing, scatter_mm), &stages, (noise, few_poses))
-    }
-
-    /// The written arm with its benefit; where it is refused beside causes and geometry alone is not, that, with a note.
-    ///
-    /// A cause whose law is only nearly right can drive links that the rows determine through it alone: where links warm up unequally,
-    /// a common growth is met by a link of another length whose constant part the frames take up.
-    fn or_geometry_alone(
-        &self,
-        with_causes: (Estimated, Option<Benefit>),
-        robot: &str,
-        notes: &mut Vec<String>,
-    ) -> (Estimated, Option<Benefit>) {
-        let verdict = &with_causes.0.verdict;
-        if verdict.status != Judgement::Fail || self.search.extended.causes.is_empty() {
-            return with_causes;
-        }
-        let plain = written(self.search, &[], None);
-        let Some(alone) = as_identified(self.search.context, robot, &plain, self.discrepancy) else {
-            return with_causes;
-        };
-        // An arm that is refused as implausible does not say how far this one may be off.
-        let alone = self.estimated(robot, [&alone; 2], &self.search.validation.stage(&alone));
-        if !matches!(alone.0.verdict.status, Judgement::Pass | Judgement::NotEvaluated) {
-            return with_causes;
-        }
-        notes.push(format!(
-            "the written arm is geometry alone, as `identify` fits it: beside the causes the arm is refused, since {}",
-            verdict.reasons.first().map_or("it is implausible", String::as_str)
-        ));
-        alone
-    }
-}
-
-/// The same rows identified, with the options of the diagnosis.
-fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification> {
-    let SearchContext { dataset, subject, options, .. } = context;
-    let defaults = identify::Options::default();
-    let alone = identify::Options {
-        tolerance: options.arm_tolerance,
-        seed: options.selection.seed,
-        fuse_readout: options.fuse_readout,
-        limit_rmse_mm: options.limits.rmse_mm,
-        limit_max_mm: options.limits.max_mm,
-        ..defaults
-    };
-    let share = |rows: &Dataset| split::random(rows, alone.held_out, alone.seed);
-    identify::identify(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
-}
-
-/// A written arm without causes, with the estimate of `identify`: what names nothing should not write another geometry. `None` where that
-/// fit has other parameters or failed.
-fn as_identified(
-    context: &SearchContext<'_>,
-    robot: &str,
-    written: &Extended,
-    discrepancy: Option<&Discrepancy>,
-) -> Option<Extended> {
-    let Fitted { parameters, priors, estimate, model, frames, problem, .. } =
-        identified(context, robot)?.geometry;
-    let place = |p| parameters.iter().position(|q| q == p);
-    let places = written.parameters.iter().map(place).collect::<Option<Vec<usize>>>()?;
-    // Rows that it rejects are few: those left count as consecutive.
-    let numbers: Vec<usize> = (0..problem.rows() / problem.rows_per_observation()).collect();
-    let own = estimate.covariance.as_ref()?;
-    let own = under_correlated_noise(&problem, &estimate.x, own, discrepancy, &numbers);
-    let covariance = DMatrix::from_fn(places.len(), places.len(), |a, b| own[(places[a], places[b])]);
-    let x: Vec<f64> = places.iter().map(|&k| estimate.x[k]).collect();
-    let priors = places.iter().map(|&k| priors[k]).collect();
-    let estimate = Estimate { x: x.clone(), covariance: Some(covariance), ..estimate };
-    Some(Extended { priors, x, model, frames, estimate, ..written.clone() })
-}
-
-/// The model with `causes` under the tolerances of the arm.
-fn written(search: &Search<'_>, causes: &[Cause], discrepancy: Option<&Discrepancy>) -> Extended {
-    let SearchContext { subject, options, .. } = &search.context;
-    fit_written(subject, &options.arm_tolerance, &search.extended, causes, discrepancy)
-}
-
-/// The arm for compensation, with its errors. Its effects are included only if they lower the held-out error of this very model, in
-/// random folds and in blocks; causes that are not part of it do not count.
-fn certain_model(
-    search: &Search<'_>,
-    certain: &[bool],
-    discrepancy: Option<&Discrepancy>,
-) -> (Extended, StageError) {
-    let of = |certain: &[bool]| {
-        let fit = written(search, &certain_causes(&search.extended, certain), discrepancy);
-        let errors = search.validation.stage(&fit);
-        (fit, errors)
-    };
-    let (fit, errors) = of(certain);
-    let of_the_arm = |cause: &Cause| matches!(cause, Cause::Arm(_));
-    let is_carried = |cause: &Cause| of_the_arm(cause) || cause.stand_in().is_some();
-    let better =
-        |than: &StageError| errors.random.rmse < than.random.rmse && errors.blocks.rmse < than.blocks.rmse;
-    let arm_alone = fit.causes.iter().all(of_the_arm);
-    if !fit.causes.iter().any(of_the_arm) || arm_alone && better(&search.stages[1]) {
-        return (fit, errors);
-    }
-    let causes = &search.extended.causes;
-    let without: Vec<bool> =
-        certain.iter().zip(causes).map(|(sure, cause)| *sure && !is_carried(cause)).collect();
-    let plain = of(&without);
-    if better(&plain.1) { (fit, errors) } else { plain }
-}
-
-/// `certain_model`, or, with the probability, the same fitted without the causes of the measurement if these make a worse arm too
-/// probable.
-fn without_measurement_causes(
-    search: &Search<'_>,
-    certain_model: (Extended, StageError),
-    discrepancy: Option<&Discrepancy>,
-) -> ((Extended, StageError), Option<f64>) {
-    let of_the_arm: Vec<Cause> =
-        certain_model.0.causes.iter().filter(|cause| matches!(cause, Cause::Arm(_))).cloned().collect();
-    if of_the_arm.len() == certain_model.0.causes.len() && time_discrepancy(discrepancy).is_none() {
-        return (certain_model, None);
-    }
-    let SearchContext { dataset, subject, .. } = search.context;
-    let correlated = discrepancy.filter(|d| d.correlation > 0.0);
-    let without = written(search, &of_the_arm, correlated);
-    let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
-    let beside = in_doubt::with_zero_causes(&without, certain_model.0.clone());
-    match probability_worse(&certain_model.0, &beside, &mean_condition(dataset), &samples) {
-        Some(chance) if chance > sensor_causes::MOST_PROBABILITY => {
-            let errors = search.validation.stage(&without);
-            ((without, errors), Some(chance))
-        }
-        _ => (certain_model, None),
-    }
-}
-
-/// The written arm extended by uncertain causes of size 0; `None` if it includes all causes already.
-fn with_uncertain_causes(
-    search: &Search<'_>,
-    fit: &Extended,
-    discrepancy: Option<&Discrepancy>,
-) -> Option<Extended> {
-    let all = in_doubt::representable_causes(&search.extended.causes, &search.accepted);
-    let missing = |cause: &Cause| !contains_cause(&fit.causes, cause);
-    all.iter().any(missing).then(|| in_doubt::with_zero_causes(fit, written(search, &all, discrepancy)))
-}
-
 /// Builds the diagnosis, and the pictures of its findings.
 fn build_diagnosis(
     search: &Search<'_>,
@@ -400,7 +170,8 @@ fn build_diagnosis(
         && let crate::identification::rounding::NotFused::Mismatch { found_mm, expected_mm } = why
     {
         notes.push(format!(
-            "the read-out deviates from the angles by {found_mm:.2} mm where rounding allows {expected_mm:.2} mm: it was not fused with them"
+            "the readout deviates from the angles by {found_mm:.2} mm, and rounding allows {expected_mm:.2} mm: it was not fused with \
+             them"
         ));
     }
     notes.extend(single_angles(dataset));
@@ -408,7 +179,7 @@ fn build_diagnosis(
         && search.found.causes.iter().any(|c| matches!(c, Cause::Arm(Effect::Backlash(_))))
     {
         notes.push(
-            "the sides of approach were not logged (columns approach1 to approach6): backlash was judged as if every row had been approached \
+            "the sides of approach were not logged (columns approach1 to approach6): backlash was judged as if the arm had come \
              straight from the row before"
                 .to_owned(),
         );
@@ -422,13 +193,13 @@ fn build_diagnosis(
     measure_again.dedup();
     let (mut findings, pictures): (Vec<_>, Vec<_>) =
         summary.findings.into_iter().map(|s| (s.finding, s.picture)).unzip();
-    let asking = decision::Asking {
+    let question = decision::DecisionQuestion {
         robot,
         sensor: dataset.sensor,
         frames: &search.extended.frames,
         something_else: summary.something_else.as_ref(),
     };
-    asking.complete(&mut findings);
+    question.complete(&mut findings);
     let diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
         verdict: None,
@@ -505,109 +276,4 @@ fn fits(search: &Search<'_>) -> Fits {
         geometric: stage(1, &search.geometric),
         extended: stage(2, &search.extended),
     }
-}
-
-/// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes, what both lack, and the
-/// size of a scatter about a joint (mm RMS), which remains with and without correction, as what all causes leave beyond the noise does. Of too
-/// few poses no benefit is stated: it would be the priors'.
-fn estimated(
-    search: &Search<'_>,
-    robot: &str,
-    ([fitted, handed], missing, scatter_mm): (&[Fitted; 2], Vec<MissingError>, f64),
-    stages: &[StageError; 3],
-    (noise, few_poses): (Noise, Option<&str>),
-) -> (Estimated, Option<Benefit>) {
-    let SearchContext { dataset, prepared, subject, options, .. } = search.context;
-    let set_aside = &search.set_aside;
-    let nominal_arm = subject.nominal;
-    let order = arm_parameters_of(handed);
-    let mut estimated = Estimated {
-        robot: robot.to_owned(),
-        nominal: nominal_arm.clone(),
-        model: handed.model.clone(),
-        covariance: arm_covariance(handed),
-        width_uncertainty: learned_width_uncertainty(&options.arm_tolerance, fitted),
-        order,
-        provenance: Provenance {
-            file: dataset.file.clone(),
-            sha256: dataset.sha256.clone(),
-            rows: dataset.rows.len() - set_aside.len(),
-            set_aside: set_aside.iter().map(|&i| dataset.rows[i].number).collect(),
-            sensor: dataset.sensor,
-            method: "diagnose".to_owned(),
-            seed: options.selection.seed,
-            held_out: 0.2,
-            sharpened: prepared.readout_fusion.is_ok(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-        },
-        parameters: parameter_table(handed, nominal_arm).into_iter().filter(|p| p.is_of_arm()).collect(),
-        registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
-        geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
-        noise_floor_mm: noise.floor_mm,
-        beyond_noise_mm: noise.beyond.known_mm(),
-        verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
-        region: Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0),
-        condition: mean_condition(dataset),
-    };
-    in_doubt::add_missing_errors(&mut estimated, missing);
-    let mut estimated = with_sigma_in_region(estimated, handed);
-    let rows = &subject.observed.dataset;
-    // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
-    let plausible = &options.arm_tolerance;
-    let benefit =
-        || benefit(fitted, rows, &estimated, plausible, variance_inflation(fitted, rows, &stages[2]));
-    let beyond_noise = noise.beyond.or_scatter(scatter_mm);
-    let benefit =
-        few_poses.map_or_else(|| Ok(benefit().map(|benefit: Benefit| benefit.with(beyond_noise))), Err);
-    let parameters = parameter_table(fitted, nominal_arm);
-    let judged = benefit.as_ref().map(Option::as_ref).map_err(|few| *few);
-    let unseen = unseen_target(handed, rows, &estimated);
-    estimated.verdict = judge(fitted, (rows.sensor, unseen), judged, &parameters, stages, options);
-    (estimated, benefit.ok().flatten())
-}
-
-/// The verdict of an identification, plus: findings must not raise the held-out error of geometry. `benefit` says why it is not stated.
-fn judge(
-    fitted: &Fitted,
-    (sensor, unseen_target): (Sensor, Option<String>),
-    benefit: Result<Option<&Benefit>, &str>,
-    parameters: &[EstimatedParameter],
-    stages: &[StageError; 3],
-    options: &Options,
-) -> Verdict {
-    let mut verdict = VerdictBuilder::default();
-    if fitted.termination().is_converged() {
-        verdict.note(CONVERGED);
-    } else {
-        verdict.fail(format!("the fit did not converge: {}", fitted.termination()));
-    }
-    if stages[2].blocks.rmse > stages[1].blocks.rmse * 1.05 && stages[2].random.rmse > stages[1].random.rmse {
-        verdict.fail(format!(
-            "the held-out error is {:.3} mm with the findings, but {:.3} mm with geometry alone",
-            stages[2].random.rmse, stages[1].random.rmse
-        ));
-    }
-    verdict.check_links(parameters, &options.arm_tolerance, LINK_Z);
-    verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
-    match benefit {
-        Ok(benefit) => verdict.check_benefit(benefit, sensor),
-        Err(few_poses) => verdict.doubt(few_poses),
-    }
-    if let Some(unseen_target) = unseen_target {
-        verdict.note(unseen_target);
-    }
-    verdict.check_limits(&options.limits, &stages[2].random);
-    verdict.build()
-}
-
-/// Squared held-out error relative to its expectation: with k parameters determined by n readings it is (n + k) / (n − k) times that of
-/// the fit.
-fn variance_inflation(fitted: &Fitted, dataset: &Dataset, errors: &StageError) -> f64 {
-    let per = fitted.problem.rows_per_observation();
-    let n = (dataset.rows.len() * per) as f64;
-    let shares = fitted.sigmas().into_iter().zip(&fitted.priors);
-    let spent: f64 = shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum();
-    let expected = (n + spent) / (n - spent).max(0.05 * n).max(1.0);
-    let variance_inflation = (errors.random.rmse / errors.fitted.rmse).powi(2) / expected;
-    if variance_inflation.is_finite() { variance_inflation.max(1.0) } else { 1.0 }
 }

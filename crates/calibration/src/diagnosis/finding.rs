@@ -1,5 +1,7 @@
 //! The result of a diagnosis: the JSON contract `truegrind.diagnosis/1`.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::cause_kind::CauseKind;
@@ -157,6 +159,9 @@ pub struct Session {
     pub effect: CauseKind,
     /// The same in a sentence.
     pub cause: String,
+    /// What shifted, without its rows and what may have done it; absent in files.
+    #[serde(skip)]
+    pub shift: Option<String>,
     /// Contribution to the readings (mm RMS over all rows).
     pub worth_mm: f64,
 }
@@ -168,6 +173,12 @@ pub struct Finding {
     pub effect: CauseKind,
     /// One sentence for a technician.
     pub cause: String,
+    /// The parts of `cause` where it is a list of several; absent in files.
+    #[serde(skip)]
+    pub terms: Vec<String>,
+    /// What shifted, without its rows and what may have done it, where some rows were displaced; absent in files.
+    #[serde(skip)]
+    pub shift: Option<String>,
     /// Confidence.
     pub confidence: Confidence,
     /// Rows as the data set numbers them, both ends included; the JSON that `diagnose` writes counts data rows from 0.
@@ -281,8 +292,8 @@ pub struct Diagnosis {
     pub verdict: Option<Verdict>,
     /// Noise floor of sensor and rounding (mm), if known.
     pub noise_floor_mm: Option<f64>,
-    /// Source of the noise floor, in words.
-    pub noise_floor_source: String,
+    /// Source of the noise floor.
+    pub noise_floor_source: NoiseFloorSource,
     /// Errors of the stages.
     pub fits: Fits,
     /// Held-out error after each step.
@@ -341,12 +352,82 @@ impl Diagnosis {
 
     /// Whether poses were repeated, so that the noise floor is that of the sensor and not of rounding alone.
     pub fn is_noise_measured(&self) -> bool {
-        self.noise_floor_source != ROUNDING_ALONE
+        self.noise_floor_source != NoiseFloorSource::RoundingAlone
     }
 }
 
-/// Source of a noise floor without repeated poses.
-pub(super) const ROUNDING_ALONE: &str = "rounding alone; too few poses were repeated";
+impl Finding {
+    /// Adds a part to the list that its cause is.
+    pub(super) fn add_term(&mut self, term: String) {
+        if self.terms.is_empty() {
+            self.terms.push(self.cause.clone());
+        }
+        self.terms.push(term);
+        self.cause = self.terms.join("; ");
+    }
+
+    /// Makes its cause a list of several parts.
+    pub(super) fn set_terms(&mut self, terms: Vec<String>) {
+        self.cause = terms.join("; ");
+        self.terms = terms;
+    }
+}
+
+/// What a noise floor is known from. In files it is its sentence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum NoiseFloorSource {
+    /// The scatter of repeated poses.
+    Repeats {
+        /// Repeated poses.
+        poses: usize,
+        /// Their degrees of freedom.
+        freedom: usize,
+    },
+    /// The rounding of the log, which is no noise of the sensor.
+    RoundingAlone,
+    /// Nothing.
+    Unknown,
+}
+
+/// Sentences of sources without numbers.
+const ROUNDING_ALONE: &str = "rounding alone; too few poses were repeated";
+const UNKNOWN: &str = "too few poses were repeated and nothing is rounded";
+
+impl fmt::Display for NoiseFloorSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            NoiseFloorSource::Repeats { poses, freedom } => {
+                write!(f, "{poses} repeated poses, {freedom} degrees of freedom")
+            }
+            NoiseFloorSource::RoundingAlone => f.write_str(ROUNDING_ALONE),
+            NoiseFloorSource::Unknown => f.write_str(UNKNOWN),
+        }
+    }
+}
+
+impl From<NoiseFloorSource> for String {
+    fn from(source: NoiseFloorSource) -> Self {
+        source.to_string()
+    }
+}
+
+impl TryFrom<String> for NoiseFloorSource {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let repeats = || {
+            let (poses, rest) = text.split_once(" repeated poses, ")?;
+            let freedom = rest.strip_suffix(" degrees of freedom")?;
+            Some(NoiseFloorSource::Repeats { poses: poses.parse().ok()?, freedom: freedom.parse().ok()? })
+        };
+        match text.as_str() {
+            ROUNDING_ALONE => Ok(NoiseFloorSource::RoundingAlone),
+            UNKNOWN => Ok(NoiseFloorSource::Unknown),
+            _ => repeats().ok_or_else(|| format!("{text:?} is no source of a noise floor")),
+        }
+    }
+}
 
 /// Multiple of the noise floor from which an error is not taken for noise.
 const NOT_NOISE: f64 = 3.0;

@@ -23,6 +23,7 @@ use super::words;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::error_map::ErrorMap;
+use truegrind_math::sentence::{counted, listed};
 
 /// A rival (including the model without the finding) whose held-out error is below this share of the finding's is not beaten,
 /// whatever the Bayes factor.
@@ -87,7 +88,7 @@ impl FindingBuilder<'_> {
                 self.extended.causes[first].affects_same_quantity(cause)
             });
             if let Some(place) = existing {
-                findings[place].cause = format!("{}; {}", findings[place].cause, finding.cause);
+                findings[place].add_term(finding.cause);
                 findings[place].parameters.extend(finding.parameters);
                 places.push(place);
                 continue;
@@ -112,7 +113,7 @@ impl FindingBuilder<'_> {
         };
         let causes: Vec<&Cause> = indices.map(|index| &self.extended.causes[index]).collect();
         if let Some(stretches) = along_turn(self.subject, joint - 1, &causes) {
-            finding.cause = format!("{}; {}", finding.cause, in_words(stretches));
+            finding.add_term(in_words(stretches));
         }
     }
 
@@ -135,7 +136,7 @@ impl FindingBuilder<'_> {
         }
         let moved = (!drifts.is_empty()).then(|| drift::describe(&drifts, dataset, &self.extended.frames));
         let grown = (!growth.is_empty()).then(|| drift::describe_growth(&growth, dataset));
-        finding.cause = moved.into_iter().chain(grown).chain(others).collect::<Vec<_>>().join("; ");
+        finding.set_terms(moved.into_iter().chain(grown).chain(others).collect());
     }
 
     /// Whether the joint moved through so small a part of a turn, or of a harmonic's period, that any smooth joint error fits.
@@ -239,14 +240,12 @@ impl FindingBuilder<'_> {
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
         let picture = picture(self.subject, cause, &without, &self.whole.design);
+        let measured = (&self.subject.observed.dataset, &self.extended.frames);
         let finding = Finding {
             effect: cause.kind(),
-            cause: words::describe_cause(
-                cause,
-                &parameters,
-                &self.subject.observed.dataset,
-                &self.extended.frames,
-            ),
+            cause: words::describe_cause(cause, &parameters, measured.0, measured.1),
+            terms: Vec::new(),
+            shift: words::describe_shift(cause, &parameters, measured),
             confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
             rows: cause.rows(),
             row_list: None,
@@ -256,9 +255,9 @@ impl FindingBuilder<'_> {
                 "{}: χ² falls by {:.0} for {} with everything else refitted; twice the log Bayes factor {:.0} with {} tried",
                 words::describe_pattern(cause),
                 own.own.gain,
-                counted(own.own.estimate.len(), "parameter"),
+                counted(own.own.estimate.len(), "parameter", "parameters"),
                 own.own.evidence,
-                counted(own.tried.round() as usize, "variant"),
+                counted(own.tried.round() as usize, "variant", "variants"),
             ),
             parameters,
             p_value: own.log_p.exp(),
@@ -306,10 +305,6 @@ pub(super) fn is_some_spring(finding: &Finding) -> bool {
     spring(finding.effect) && finding.doubts.is_empty() && rivals.all(|rival| spring(rival.effect))
 }
 
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
 pub(super) fn short_name(cause: &Cause) -> String {
     let joints = cause.joints();
     match (joints.as_slice(), cause.rows()) {
@@ -317,8 +312,7 @@ pub(super) fn short_name(cause: &Cause) -> String {
         ([], None) => cause.kind().to_string(),
         ([joint], _) => format!("{} of joint {}", cause.kind(), joint + 1),
         (many, _) => {
-            let list: Vec<String> = many.iter().map(|j| (j + 1).to_string()).collect();
-            format!("{} of joints {}", cause.kind(), list.join(" and "))
+            format!("{} of joints {}", cause.kind(), listed(many.iter().map(|j| j + 1)))
         }
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::algebra::eigen;
 use crate::measurement::dataset::Dataset;
-use crate::measurement::split;
+use crate::measurement::{repeated_poses, split};
 
 /// Number of halves.
 pub const HALVES: usize = 6;
@@ -21,7 +21,7 @@ const PIECES: usize = 24;
 
 /// Indices of the rows of each half, ascending; consecutive halves are complements.
 pub fn halves(dataset: &Dataset, seed: u64) -> Vec<Vec<usize>> {
-    let poses = split::poses(dataset);
+    let poses = repeated_poses::poses(dataset);
     let mut out = Vec::with_capacity(HALVES);
     let n = dataset.rows.len();
     let path = is_path(dataset);

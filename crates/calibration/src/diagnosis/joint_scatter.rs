@@ -113,7 +113,7 @@ impl JointScatter {
     /// In words, after "as if".
     pub(super) fn words(&self) -> String {
         format!(
-            "joint {} stood elsewhere from reading to reading, by {:.4}° RMS",
+            "joint {} did not return to the same angle, but scattered by {:.4}° RMS from reading to reading",
             self.joint + 1,
             self.sigma_rad.to_degrees()
         )

@@ -40,7 +40,7 @@ impl FindingBuilder<'_> {
         let doubts: Vec<String> = law
             .map(|cause| {
                 format!(
-                    "{} is in the rows, whose exact law is unknown: links explain a part of it",
+                    "the rows contain {}, whose exact form is unknown: the links absorb a part of it",
                     cause.kind().words()
                 )
             })
@@ -61,7 +61,7 @@ impl FindingBuilder<'_> {
                         CauseKind::LinkGeometry,
                         describe(joint + 1, coordinate, link),
                         confidence,
-                        "no tolerance of making an arm is so wide".to_owned(),
+                        "no manufacturing tolerance is that large".to_owned(),
                         gain,
                     )
                 }

@@ -17,6 +17,7 @@ use super::finding::{Confidence, Family, Finding, FoundParameter, Gain, Session}
 use super::findings::is_some_spring;
 use super::picture::Picture;
 use super::words;
+use truegrind_math::sentence::listed;
 
 /// A finding with its causes.
 #[derive(Debug, Clone)]
@@ -157,8 +158,7 @@ fn several_joints(members: &[MergedFinding], worth_mm: f64) -> Finding {
             ..parameter.clone()
         })
     });
-    Finding {
-        cause: findings().map(|f| f.cause.as_str()).collect::<Vec<_>>().join("; "),
+    let mut merged = Finding {
         joints: Some(findings().map(joint).collect()),
         parameters: parameters.collect(),
         evidence: findings().map(|f| f.evidence.as_str()).collect::<Vec<_>>().join("; "),
@@ -168,7 +168,10 @@ fn several_joints(members: &[MergedFinding], worth_mm: f64) -> Finding {
         worth_mm: Some(worth_mm),
         alternatives: findings().flat_map(|f| f.alternatives.iter().cloned()).collect(),
         ..first.clone()
-    }
+    };
+    let terms = |f: &Finding| if f.terms.is_empty() { vec![f.cause.clone()] } else { f.terms.clone() };
+    merged.set_terms(findings().flat_map(terms).collect());
+    merged
 }
 
 /// Causes of doubtful findings below `doubtful_mm`, smallest first, as many as exceed [`MOST_REPORTED`].
@@ -256,6 +259,7 @@ fn setup_change(members: &[MergedFinding], worth_mm: f64, steps: bool, smooth: b
                 rows: s.finding.rows?,
                 effect: s.finding.effect,
                 cause: s.finding.cause.clone(),
+                shift: s.finding.shift.clone(),
                 worth_mm: s.finding.worth_mm.unwrap_or(0.0),
             })
         })
@@ -299,11 +303,10 @@ fn setup_change(members: &[MergedFinding], worth_mm: f64, steps: bool, smooth: b
 
 /// "The zero of joint 2", "the zeros of joints 1, 2 and 3".
 fn zeros_of(joints: &BTreeSet<usize>) -> String {
-    let numbers: Vec<String> = joints.iter().map(usize::to_string).collect();
-    match numbers.as_slice() {
-        [one] => format!("the zero of joint {one}"),
-        [first @ .., last] => format!("the zeros of joints {} and {last}", first.join(", ")),
-        [] => "the zeros of joints".to_owned(),
+    match joints.len() {
+        0 => "the zeros of joints".to_owned(),
+        1 => format!("the zero of joint {}", listed(joints)),
+        _ => format!("the zeros of joints {}", listed(joints)),
     }
 }
 

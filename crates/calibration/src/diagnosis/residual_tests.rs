@@ -157,7 +157,7 @@ fn reach(nu: f64, n: usize) -> f64 {
 pub fn noise_model(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> Option<NoiseModel> {
     let dataset = &subject.observed.dataset;
     let plain = fit.problem.errors_mm(&fit.x);
-    let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0_f64.sqrt() };
+    let coordinates = (dataset.sensor.axes() as f64).sqrt();
     let pairs: Vec<(f64, f64)> = dataset
         .rows
         .iter()
@@ -223,7 +223,7 @@ pub fn structure(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> 
     // Clamped, so that no single row dominates.
     let values: Vec<Vector3<f64>> = kept.iter().map(|&i| all[i].map(|c| c.clamp(-3.0, 3.0))).collect();
     let power = values.iter().map(Vector3::norm_squared).sum::<f64>() / values.len().max(1) as f64;
-    let dimensions = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let dimensions = dataset.sensor.axes() as f64;
     let correlation = |pairs: &[(usize, usize)]| {
         let count = pairs.len().max(1) as f64;
         let r =
@@ -256,7 +256,7 @@ pub fn structure(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> 
     Structure { neighbours, neighbours_z, order, order_z }
 }
 
-/// Median error of the rows (mm).
+/// Median error of the rows (mm); NaN without rows.
 pub fn median_error_mm(fit: &Extended) -> f64 {
-    median(&fit.problem.errors_mm(&fit.x).iter().map(|e| e.abs()).collect::<Vec<_>>()).unwrap_or(0.0)
+    median(&fit.problem.errors_mm(&fit.x).iter().map(|e| e.abs()).collect::<Vec<_>>()).unwrap_or(f64::NAN)
 }

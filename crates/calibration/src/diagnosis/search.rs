@@ -87,7 +87,7 @@ impl<'a> Search<'a> {
             progress("fitting all rows");
             let rows = &searched.observed.dataset;
             notes.push(format!(
-                "causes were searched in a random {} of the {} rows; the fits and their errors are of all rows",
+                "causes were searched in {} of the {} rows, drawn at random; fits and errors use all rows",
                 rows.rows.len(),
                 dataset.rows.len()
             ));

@@ -10,9 +10,10 @@
 //! `probability`).
 
 use super::extension::Extended;
-use crate::identification::benefit::{normal_cdf, shape_metric};
 use crate::identification::fit::Fitted;
+use crate::identification::shape_metric::shape_metric;
 use truegrind_arm::condition::Condition;
+use truegrind_math::tail::normal_cdf;
 
 /// Largest probability of a worse arm up to which the written arm is fitted with the causes of the measurement.
 pub(super) const MOST_PROBABILITY: f64 = 0.02;

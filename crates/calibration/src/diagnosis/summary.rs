@@ -5,7 +5,7 @@ use super::confounding::{Confounding, excess_over_noise_mm};
 use super::contribution::Contributions;
 use super::data_quality::{Deviation, mismatch_finding, noise_floor, outlier_finding, rounding_finding};
 use super::extension::Extended;
-use super::finding::{Finding, Step};
+use super::finding::{Finding, NoiseFloorSource, Step};
 use super::findings::FindingBuilder;
 use super::held_out::FoldErrors;
 use super::joint_scatter::JointScatter;
@@ -16,7 +16,8 @@ use super::search::{Confirmed, Search};
 use super::something_else::SomethingElse;
 use super::unexplained::{Unexplained, something_else};
 use crate::measurement::dataset::{Dataset, Sensor};
-use crate::measurement::split::{self, NoiseFloor};
+use crate::measurement::noise_floor::{self, NoiseFloor};
+use crate::measurement::split;
 
 /// Summary of a search.
 pub(super) struct Summary {
@@ -27,7 +28,7 @@ pub(super) struct Summary {
     /// The fit to all rows with all parameters of its causes.
     pub(super) extended: Extended,
     /// The noise floor (mm) and its source.
-    pub(super) noise_floor: (Option<f64>, String),
+    pub(super) noise_floor: (Option<f64>, NoiseFloorSource),
     /// The scatter of repeated poses, where enough were repeated.
     pub(super) repeats: Option<NoiseFloor>,
     /// The unexplained residual, in a sentence.
@@ -49,7 +50,7 @@ pub(super) fn summarise(
     let context = search.context;
     let (subject, searched, prepared) = (&context.subject, &context.searched, context.prepared);
     let (stages, outcome) = (&search.stages, &confirmed.outcome);
-    let floor = split::noise_floor(&without_outliers(search)).filter(NoiseFloor::is_known);
+    let floor = noise_floor::noise_floor(&without_outliers(search)).filter(NoiseFloor::is_known);
     let mut steps = vec![
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
@@ -67,7 +68,7 @@ pub(super) fn summarise(
         growth_mm: outcome.discrepancy.growth_mm(),
         field_mm: outcome.discrepancy.field_mm(),
         excess_over_noise_mm: floor.map_or(0.0, |floor| {
-            let coordinates = if context.dataset.sensor == Sensor::Cable { 1 } else { 3 };
+            let coordinates = context.dataset.sensor.axes();
             excess_over_noise_mm(stages[2].fitted.rmse, floor.sigma_mm, coordinates * floor.freedom)
         }),
     };

@@ -18,7 +18,7 @@ use crate::measurement::dataset::{Dataset, Row, Sensor};
 use crate::measurement::sensor::disturbance::Disturbance;
 use truegrind_arm::estimated::Judgement;
 use truegrind_arm::model::Model;
-use truegrind_math::statistics::ErrorSummary;
+use truegrind_math::statistics::{ErrorSummary, rms};
 
 /// Models of one series.
 #[derive(Debug, Clone, Copy)]
@@ -162,10 +162,11 @@ impl Foreign {
                     .to_owned()
             }
             Foreign::BelowDataSheet => format!(
-                "the data sheet is nearer there, so it is another arm of this type, or the arm has changed in between: {otherwise}"
+                "the data sheet is nearer there, so it is another arm of this type, or the arm has changed: {otherwise}"
             ),
             Foreign::Changed(left_mm) => format!(
-                "the arm has changed in between, or it is another one, as another geometry leaves {left_mm:.3} mm there: {otherwise}"
+                "the arm has changed, or it is another one (another geometry, fitted to those rows, leaves {left_mm:.3} mm): \
+                 {otherwise}"
             ),
             Foreign::Scatters => {
                 "no other geometry explains it, so the readings scatter more there, or the load was another, or it is another arm: check sensor, \
@@ -176,14 +177,9 @@ impl Foreign {
     }
 }
 
-/// Root mean square.
-fn rms(errors: &[f64]) -> f64 {
-    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
-}
-
 /// The error over that along each axis.
 fn per_axis(sensor: Sensor) -> f64 {
-    if sensor == Sensor::Cable { 1.0 } else { 3_f64.sqrt() }
+    (sensor.axes() as f64).sqrt()
 }
 
 impl Diagnosed {
@@ -197,7 +193,8 @@ impl Diagnosed {
     ) -> Option<Foreign> {
         let sensor = observed.dataset.sensor;
         let [nominal, _, _, written] = errors;
-        let left_mm = rms(written) / per_axis(sensor);
+        let written_mm = rms(written)?;
+        let left_mm = written_mm / per_axis(sensor);
         if left_mm > OTHER_ARM_MM {
             return Some(Foreign::NotThisArm);
         }
@@ -213,8 +210,8 @@ impl Diagnosed {
         let another = fit(&subject, &[], Freedom::All, None);
         let readings = observed.dataset.rows.len() * sensor.scalars();
         let factor = if sensor == Sensor::Cable { CHANGED_CABLE } else { CHANGED };
-        let another_mm = rms(&errors_on(observed, &another.model, &another.frames));
-        let is_changed = readings >= another.parameters.len() + FREE && factor * another_mm < rms(written);
+        let another_mm = rms(&errors_on(observed, &another.model, &another.frames))?;
+        let is_changed = readings >= another.parameters.len() + FREE && factor * another_mm < written_mm;
         match (is_changed, left_mm > FOREIGN * held_out_mm) {
             (true, _) => Some(Foreign::Changed(another_mm)),
             (false, true) => Some(Foreign::Scatters),

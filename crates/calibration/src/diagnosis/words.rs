@@ -82,6 +82,8 @@ pub(super) fn finding(
     Finding {
         effect,
         cause,
+        terms: Vec::new(),
+        shift: None,
         confidence,
         rows: None,
         row_list: None,
@@ -142,7 +144,11 @@ pub fn describe_cause(
         Cause::Arm(Effect::GearEccentricity(h)) => format!(
             "the gear or encoder of joint {joint} is eccentric: ±{:.3}° {} per turn",
             h.amplitude_rad().to_degrees(),
-            if h.order == 1.0 { "once" } else { "twice" }
+            match h.order {
+                1.0 => "once".to_owned(),
+                2.0 => "twice".to_owned(),
+                order => format!("{order} times"),
+            }
         ),
         Cause::Arm(Effect::GearTransmission(h)) => format!(
             "the reducer of joint {joint} has a transmission error of ±{:.4}° at {} periods per turn",
@@ -189,23 +195,14 @@ fn describe_disturbance(
     (dataset, frames): (&Dataset, &Frames),
 ) -> String {
     let value = value_of(parameters, 0);
-    let at_target_mm = || {
-        let among = |row: &Row| d.profile.at(row) != 0.0;
-        Vector3::from(drift::shift_at_target(d, dataset, frames, among)).norm()
-    };
+    let shift = || what_shifted(d, parameters, (dataset, frames)).unwrap_or_default();
     match (&d.kind, &d.profile) {
         (Kind::Empirical(EmpiricalFault::Refraction), Profile::Temperature { .. }) => format!(
             "the tracker's beam is refracted more as the air warms up: {:.3} mm at 3 m per kelvin, growing with the square of the distance",
             9e3 * value.abs()
         ),
         (Kind::Empirical(form), _) => describe_empirical_fault(*form, parameters),
-        (Kind::Load { compliance: Some(_), .. }, _) => {
-            let side = if value < 0.0 { "less" } else { "more" };
-            format!("{rows} the arm carried {:.1} kg {side} than logged", value.abs())
-        }
-        (Kind::Load { .. }, _) => {
-            format!("{rows} the arm carried a load that was not logged")
-        }
+        (Kind::Load { .. }, _) => format!("{rows} {}", shift()),
         _ if drift::is_in_time(d) => drift::describe(&[d], dataset, frames),
         (Kind::Target, Profile::Temperature { .. }) => format!(
             "the target moves on the flange with temperature: {:.1} µm per kelvin",
@@ -216,31 +213,66 @@ fn describe_disturbance(
         }
         (_, Profile::Temperature { .. }) => format!(
             "the sensor moves relative to the base with temperature, by {:.1} µm per kelvin",
-            at_target_mm() * 1e3
+            at_target_mm(d, (dataset, frames)) * 1e3
         ),
-        (Kind::JointZero { joint }, _) => format!(
-            "{rows} the zero of joint {} was off by {:.4}° against all other rows: its encoder lost counts, a belt slipped, or it was \
-             mastered again",
-            joint + 1,
-            value.to_degrees().abs()
-        ),
-        (Kind::Zero, _) => format!("the cable's zero jumped by {value:.3} mm {rows}"),
+        (Kind::JointZero { .. }, _) => {
+            format!("{rows} {}: its encoder lost counts, a belt slipped, or it was mastered again", shift())
+        }
+        (Kind::Zero, _) => format!("{} {rows}", shift()),
         (Kind::Frame { .. }, _) => {
             let moved = if dataset.sensor == Sensor::Cable { "its outlet" } else { "its stand" };
-            format!(
-                "the sensor was displaced by {:.3} mm against the arm {rows}: {moved} or the base of the arm moved",
-                at_target_mm()
-            )
+            format!("{} {rows}: {moved} or the base of the arm moved", shift())
         }
-        (Kind::Target, _) => format!(
-            "the target was displaced on the flange by {:.3} mm {rows}: the hook or reflector slipped",
-            norm(parameters)
-        ),
+        (Kind::Target, _) => format!("{} {rows}: the hook or reflector slipped", shift()),
         (Kind::Scale, _) => format!("the sensor's scale is wrong by {:.3} %", value * 100.0),
         (Kind::Sag, _) => {
             format!("the cable sags: weight over tension {:.4} per metre", value.max(0.0).sqrt())
         }
     }
+}
+
+/// What a cause shifted in some of the rows, without these and what may have done it; `None` for a cause of all rows.
+pub(super) fn describe_shift(
+    cause: &Cause,
+    parameters: &[FoundParameter],
+    measured: (&Dataset, &Frames),
+) -> Option<String> {
+    match cause {
+        Cause::Measurement(d) if cause.rows().is_some() => what_shifted(d, parameters, measured),
+        _ => None,
+    }
+}
+
+fn what_shifted(
+    d: &Disturbance,
+    parameters: &[FoundParameter],
+    measured: (&Dataset, &Frames),
+) -> Option<String> {
+    let value = value_of(parameters, 0);
+    Some(match &d.kind {
+        Kind::Load { compliance: Some(_), .. } => {
+            let side = if value < 0.0 { "less" } else { "more" };
+            format!("the arm carried {:.1} kg {side} than logged", value.abs())
+        }
+        Kind::Load { .. } => "the arm carried a load that was not logged".to_owned(),
+        Kind::JointZero { joint } => format!(
+            "the zero of joint {} was off by {:.4}° against all other rows",
+            joint + 1,
+            value.to_degrees().abs()
+        ),
+        Kind::Zero => format!("the cable's zero jumped by {value:.3} mm"),
+        Kind::Frame { .. } => {
+            format!("the sensor was displaced by {:.3} mm against the arm", at_target_mm(d, measured))
+        }
+        Kind::Target => format!("the target was displaced on the flange by {:.3} mm", norm(parameters)),
+        _ => return None,
+    })
+}
+
+/// How far a disturbance moves the target in the rows that it is in (mm).
+fn at_target_mm(d: &Disturbance, (dataset, frames): (&Dataset, &Frames)) -> f64 {
+    let among = |row: &Row| d.profile.at(row) != 0.0;
+    Vector3::from(drift::shift_at_target(d, dataset, frames, among)).norm()
 }
 
 /// One sentence for an empirical fault.
@@ -273,7 +305,7 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
             value.to_degrees()
         ),
         EmpiricalFault::LoadedPlay { .. } => format!(
-            "joint {joint} has {:.4}° of play that its load closes: gravity decides which flank bears",
+            "joint {joint} has {:.4}° of backlash that gravity closes: the load decides which flank of the gear carries it",
             value.to_degrees()
         ),
         EmpiricalFault::TwoJointGear { other, .. } => {
@@ -402,7 +434,7 @@ pub fn describe_pattern(cause: &Cause) -> String {
 pub(super) fn remedy_of(cause: &Cause) -> &'static str {
     match cause.kind() {
         CauseKind::Backlash if cause.is_empirical() => {
-            "adjust the gear mesh; the written model does not include it, so keep programs away from poses at which the load changes sides"
+            "adjust the gear mesh; the written model leaves it out, so keep programs away from poses at which the load changes sides"
         }
         CauseKind::ThermalDrift
             if matches!(cause, Cause::Measurement(Disturbance { kind: Kind::Zero, .. })) =>
@@ -480,12 +512,12 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         CableDrum => "check the cable sensor against a length standard over its whole range",
         TargetNest => "turn the target towards the sensor; check its nest and replace the reflector",
         TargetDroop => {
-            "stiffen the target's pole or adapter, or measure with the target near the flange; the written model does not include it, since no \
-             tool droops so"
+            "stiffen the target's pole or adapter, or measure with the target near the flange; the written model leaves it out, since \
+             a tool does not droop this way"
         }
         BaseTilt => {
-            "bolt or grout the pedestal, and read a level on it with the arm stretched out and folded; the written model includes of it \
-             what a yielding joint 2 does as well, so measure again then"
+            "bolt or grout the pedestal, and read a level on it with the arm stretched out and folded; the written model contains \
+             only the part that looks like compliance of joint 2, so measure again afterwards"
         }
         CableSag => "increase the cable's tension or shorten the distance",
         AngleRounding => "log angles with more digits",
@@ -494,7 +526,7 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         SetupChange => {
             "measure reference points before and after each session, and repeat the rows of displaced sessions"
         }
-        SmallDisturbances => "none: the model includes those that are the arm's",
+        SmallDisturbances => "nothing: the arm's share of them is in the model",
         _ => "measure more poses where the picture shows the largest residuals",
     }
 }

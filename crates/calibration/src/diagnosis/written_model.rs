@@ -1,7 +1,7 @@
 //! The arm for compensation: geometry and identified effects, fitted with the causes of the measurement as nuisance.
 //!
 //! Every effect in this model moves real programs, so uncertain effects are excluded; geometry absorbs part of them, and the
-//! covariance accounts for the rest (`in_doubt`). The discrepancy in time and that of a sensor fault's law (`sensor_law`) are nuisances
+//! covariance accounts for the rest (`in_doubt`). The discrepancy in time and that of a sensor fault's law (`sensor_discrepancy`) are nuisances
 //! too: they widen the arm's covariance instead of biasing its links.
 
 use nalgebra::DMatrix;
@@ -12,7 +12,7 @@ use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Freedom, Subject, filled, fit};
 use super::link_growth;
 use super::selection::contains_cause;
-use super::sensor_law;
+use super::sensor_discrepancy;
 use crate::identification::calibration::CalibrationProblem;
 use crate::identification::prior_width::learn_tolerance;
 use crate::identification::tolerance::Tolerance;
@@ -133,11 +133,11 @@ fn with_random_functions(
     fit: &Extended,
     time_discrepancy: Option<&Discrepancy>,
 ) -> Option<Extended> {
-    if time_discrepancy.is_none() && !sensor_law::is_needed(fit) && !link_growth::is_needed(fit) {
+    if time_discrepancy.is_none() && !sensor_discrepancy::is_needed(fit) && !link_growth::is_needed(fit) {
         return None;
     }
     let linear = Linear::of(subject, fit);
-    let mut functions = sensor_law::columns(subject, fit, &linear);
+    let mut functions = sensor_discrepancy::columns(subject, fit, &linear);
     functions.extend(link_growth::random_effects(subject, fit, &linear));
     // Beside a random course of the arm's growth the growth that the model has would be free to take any sign.
     let growth_is_known = fit.causes.iter().any(Cause::is_growth_of_arm);

@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use crate::measurement::dataset::Sensor;
-use crate::measurement::split::NoiseFloor;
+use crate::measurement::noise_floor::NoiseFloor;
 use truegrind_arm::estimated::StageErrors;
 use truegrind_math::distribution::chi_square_quantile;
 
@@ -42,11 +42,10 @@ impl BeyondNoise {
     /// A cable sees one coordinate of the error, taken as alike in all three. Of few rows the held-out error is large because the
     /// parameters are uncertain, which is stated elsewhere: the smaller of held-out and fitted error counts.
     pub fn of(errors: &StageErrors, sensor: Sensor, repeats: Option<&NoiseFloor>) -> Self {
-        let coordinates: usize = if sensor == Sensor::Cable { 1 } else { 3 };
         let seen_mm = errors.held_out.rmse.min(errors.fitted.rmse);
         let of_position = of_position(sensor);
         let Some(floor) = repeats else { return Self::AtMost(of_position * seen_mm) };
-        let freedom = coordinates * floor.freedom;
+        let freedom = sensor.axes() * floor.freedom;
         let noise_mm = floor.sigma_mm * (freedom as f64 / chi_square_quantile(CERTAIN, freedom)).sqrt();
         Self::Known(if seen_mm > noise_mm {
             of_position * (seen_mm.powi(2) - floor.sigma_mm.powi(2)).max(0.0).sqrt()
@@ -56,7 +55,7 @@ impl BeyondNoise {
     }
 
     /// Beside rounding of the log, which is no error of the arm: its RMS in the readings (mm).
-    pub fn beside_rounding(self, rounding_mm: Option<f64>, sensor: Sensor) -> Self {
+    pub fn less_rounding(self, rounding_mm: Option<f64>, sensor: Sensor) -> Self {
         match (self, rounding_mm) {
             (Self::AtMost(mm), Some(rounding_mm)) => {
                 Self::AtMost((mm.powi(2) - (of_position(sensor) * rounding_mm).powi(2)).max(0.0).sqrt())
@@ -67,7 +66,7 @@ impl BeyondNoise {
 
     /// Of a model that lacks some of the causes with which `self` was judged: `all` are the errors with them, `own` those of the model.
     /// `of_arm`: what it lacks is the arm's, not the sensor's.
-    pub fn of_part(self, all: &StageErrors, own: &StageErrors, sensor: Sensor, of_arm: bool) -> Self {
+    pub fn of_submodel(self, all: &StageErrors, own: &StageErrors, sensor: Sensor, of_arm: bool) -> Self {
         let [all_mm, own_mm] = [all, own].map(|errors| errors.held_out.rmse.min(errors.fitted.rmse));
         if !(own_mm > LACKS * all_mm) {
             return self;
@@ -90,7 +89,7 @@ impl BeyondNoise {
     }
 
     /// At least a scatter of the arm (mm), which is seen without repeated poses too.
-    pub fn or_scatter(self, scatter_mm: f64) -> Self {
+    pub fn at_least_scatter(self, scatter_mm: f64) -> Self {
         match self {
             Self::Known(mm) => Self::Known(mm.max(scatter_mm)),
             Self::AtMost(most_mm) if scatter_mm > 0.0 => {

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use rayon::prelude::*;
 
-use crate::identification::benefit::{Benefit, benefit, variance_inflation, widen_by_scale};
+use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
@@ -12,6 +12,8 @@ use crate::identification::fit::{
     median_orientation_error, orientation_errors, outliers, summary_on,
 };
 use crate::identification::identifiability::Identifiability;
+use crate::identification::inflation::inflation_from_rows;
+use crate::identification::linearised_readings::widen_by_scale;
 use crate::identification::prior_width::width_uncertainty;
 use crate::identification::rounding::{
     AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance, rounding_floor_mm,
@@ -23,7 +25,8 @@ use crate::identification::tolerance::Tolerance;
 use crate::identification::unseen_target::unseen_target;
 use crate::identification::verdict::{CONVERGED, Limits, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
-use crate::measurement::split::{self, NoiseFloor, Split};
+use crate::measurement::noise_floor::{self, NoiseFloor};
+use crate::measurement::split::Split;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{
     Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict, WidthUncertainty,
@@ -33,6 +36,7 @@ use truegrind_arm::parameter::{Parameter, arm_parameters, link_parameters};
 use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Termination;
 use truegrind_estimation::problem::Problem;
+use truegrind_math::sentence::listed;
 use truegrind_math::statistics::{ErrorSummary, largest, median};
 use truegrind_math::work::{checkpoint, report_step};
 
@@ -178,7 +182,7 @@ pub fn identify(
     let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
     // Before the fits, to limit peak memory.
-    let repeats = split::noise_floor(&observed.dataset).filter(NoiseFloor::is_known);
+    let repeats = noise_floor::noise_floor(&observed.dataset).filter(NoiseFloor::is_known);
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let (fitted_rows, held_rows) = {
         let Split { train, test } = split(&observed.dataset);
@@ -197,8 +201,9 @@ pub fn identify(
         }
     };
     let trained = fit_training_rows(&stages, &fitted_rows, &held_rows).map_err(wrong_arm)?;
+    // A method as printed has no priors, of which a benefit is made.
     let variance_inflation =
-        (!options.solver.as_printed).then(|| variance_inflation(&trained.training, &held_rows));
+        (!options.solver.as_printed).then(|| inflation_from_rows(&trained.training, &held_rows));
     drop((fitted_rows, held_rows));
     // The final model, from all rows.
     report_step("fitting all rows");
@@ -231,19 +236,18 @@ pub fn identify(
     report_step("estimating the benefit for programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
     let beyond_noise = BeyondNoise::of(&trained.geometry, observed.dataset.sensor, repeats.as_ref())
-        .beside_rounding(estimated.noise_floor_mm, observed.dataset.sensor);
+        .less_rounding(estimated.noise_floor_mm, observed.dataset.sensor);
     estimated.beyond_noise_mm = beyond_noise.known_mm();
-    let benefit = variance_inflation
-        .and_then(|variance_inflation| {
-            benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
-        })
-        .map(|benefit| benefit.with(beyond_noise));
+    let benefit = variance_inflation.map(|variance_inflation| {
+        benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
+            .map(|benefit| benefit.with_unmodelled(beyond_noise))
+    });
     let case = VerdictInputs {
         trained: &trained,
         geometry: &geometry,
         parameters: &parameters,
         outliers: &outliers,
-        benefit: benefit.as_ref(),
+        benefit: benefit.as_ref().map(Result::as_ref),
         sensor: dataset.sensor,
         still: still_joints(&estimated.region),
         set_up_anew: set_up_anew(&observed.dataset, &geometry),
@@ -252,7 +256,7 @@ pub fn identify(
     estimated.verdict = judge(&case, options);
     Ok(Identification {
         estimated,
-        benefit,
+        benefit: benefit.and_then(Result::ok),
         geometry,
         registered,
         training: trained.training,
@@ -445,11 +449,7 @@ pub fn prepare_observations(
 
 fn check_row_count(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), IdentifyError> {
     let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
-    let per = match dataset.sensor {
-        Sensor::Cable => 1,
-        Sensor::Position => 3,
-        Sensor::Pose => 6,
-    };
+    let per = dataset.sensor.scalars();
     let rows = dataset.rows.len();
     let needed = (((parameters + 1).div_ceil(per)) as f64 / (1.0 - held_out)).ceil() as usize;
     let poses = count_distinct_poses(dataset, 2 * needed);
@@ -619,7 +619,8 @@ struct VerdictInputs<'a> {
     geometry: &'a Fitted,
     parameters: &'a [EstimatedParameter],
     outliers: &'a Outliers,
-    benefit: Option<&'a Benefit>,
+    /// Absent for a method as printed.
+    benefit: Option<Result<&'a Benefit, &'a NoBenefit>>,
     sensor: Sensor,
     /// Joints that hardly moved (from 1).
     still: Vec<usize>,
@@ -661,12 +662,11 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     verdict.check_links(case.parameters, &options.tolerance, 0.0);
     if !case.still.is_empty() {
         verdict.note(format!(
-            "{} of less than {:.0}°: what these rows do not show of {} stays as the data sheet has it",
+            "{} of less than {:.0}°: whatever these rows do not show of {} stays as in the data sheet",
             if case.still.len() == 1 {
                 format!("joint {} moved through a range", case.still[0])
             } else {
-                let joints: Vec<String> = case.still.iter().map(usize::to_string).collect();
-                format!("joints {} moved through ranges", joints.join(", "))
+                format!("joints {} moved through ranges", listed(&case.still))
             },
             STILL_DEG,
             if case.still.len() == 1 { "it" } else { "them" }
@@ -686,8 +686,8 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     }
     let (before, held) = (case.trained.registered.held_out.rmse, case.trained.geometry.held_out.rmse);
     verdict.check_held_out(before, held);
-    if !options.solver.as_printed {
-        verdict.check_benefit(case.benefit, case.sensor);
+    if let Some(benefit) = case.benefit {
+        verdict.check_benefit(benefit, case.sensor);
     }
     let limits = Limits { rmse_mm: options.limit_rmse_mm, max_mm: options.limit_max_mm };
     verdict.check_limits(&limits, &case.trained.geometry.held_out);

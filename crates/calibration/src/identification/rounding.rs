@@ -258,7 +258,7 @@ pub fn rounding_floor_mm(
     angles: &AngleCovariance,
 ) -> Option<f64> {
     let shares = angle_shares(dataset, model, frames, angles);
-    let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let coordinates = dataset.sensor.axes() as f64;
     let of_angles = shares.iter().map(|share| share.0).sum::<f64>() / shares.len().max(1) as f64;
     let of_reading =
         dataset.reading_step_mm.filter(|step| *step >= COARSE_MM).map_or(0.0, |step| step * step / 12.0);

@@ -70,8 +70,8 @@ pub(super) fn set_up_anew(dataset: &Dataset, fitted: &Fitted) -> Option<String> 
     let name =
         |session: &str| if session.is_empty() { "without a name".to_owned() } else { session.to_owned() };
     Some(format!(
-        "the readings of sessions {} and {} differ by {mm:.3} mm in the mean where one sensor frame and one target are fitted to all: sensor or \
-         target stood elsewhere. Identify each session alone, or let `diagnose` find what moved",
+        "the readings of sessions {} and {} differ by {mm:.3} mm in the mean with one sensor frame and one target for both: sensor or \
+         target was moved. Identify each session alone, or let `diagnose` find what moved",
         name(a.0),
         name(b.0)
     ))

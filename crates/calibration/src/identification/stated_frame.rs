@@ -16,10 +16,10 @@
 
 use nalgebra::{DMatrix, DVector, Point3, UnitQuaternion, Vector3, Vector6};
 
-use super::benefit::widen_by_scale;
 use super::calibration::Frames;
 use super::fit::{Fitted, Observations, errors_on};
 use super::identify::{Options, identify};
+use super::linearised_readings::widen_by_scale;
 use super::rounding::logged_covariance;
 use super::sensor_laws::mean_reading;
 use super::start::unseen_target;
@@ -163,7 +163,7 @@ const CONTRADICTS: f64 = 50.0;
 /// How many times the error that geometry leaves the stated frame must be off: what else is wrong with an arm shifts the frame too.
 const OF_FIT: f64 = 3.0;
 /// Relative error of the sensor's scale, where none is stated.
-const UNSTATED_SCALE: f64 = 1e-2;
+const WIDEST_SCALE: f64 = 1e-2;
 
 /// What speaks against a stated frame, or a cable's outlet and zero, of standard deviation `sigma` (mm; rad), beside `geometry`, fitted
 /// with free frames to readings whose scale is right to `scale`; `None` if nothing does.
@@ -176,7 +176,7 @@ pub fn contradiction_beside_geometry(
 ) -> Option<String> {
     if scale.is_none() {
         // What is stated is in the covariance.
-        widen_by_scale(&mut geometry, dataset, UNSTATED_SCALE);
+        widen_by_scale(&mut geometry, dataset, WIDEST_SCALE);
     }
     let own: Vec<usize> =
         (0..geometry.parameters.len()).filter(|&k| is_of_frame(&geometry.parameters[k])).collect();
@@ -187,7 +187,7 @@ pub fn contradiction_beside_geometry(
         .map(|&k| difference(&geometry.parameters[k], stated, &geometry.frames, &centre))
         .unzip::<f64, f64, Vec<f64>, Vec<f64>>();
     let (difference, by_scale) =
-        (DVector::from_vec(difference), DVector::from_vec(by_scale) * scale.unwrap_or(UNSTATED_SCALE));
+        (DVector::from_vec(difference), DVector::from_vec(by_scale) * scale.unwrap_or(WIDEST_SCALE));
     let of_stated = DMatrix::from_diagonal(&DVector::from_iterator(
         own.len(),
         own.iter().map(|&k| {

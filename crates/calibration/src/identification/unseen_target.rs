@@ -64,10 +64,11 @@ pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Esti
         format!("{:.decimals$}", (at[k] * scale).round() / scale + 0.0)
     });
     Some(format!(
-        "the place of the target on the flange is not seen by these poses, {poses}: another place of the target is another place of the sensor. It \
-         is taken to be {x},{y},{z} mm and known to ± {known_mm:.decimals$} mm only (--touched-point and --touched-sigma state it). The errors in mm here are \
-         those of the target; a tool whose tip is {TIP_MM:.0} mm from it may be off by a further {:.3} mm (1 sigma), and by as many times more as it \
-         is farther away. To see it, measure two or three more poses with the flange turned by 30° or more about different axes",
+        "these poses, {poses}, do not show where the target sits on the flange: another place of the target looks like another place \
+         of the sensor. It is taken to be {x},{y},{z} mm and known to ± {known_mm:.decimals$} mm only (--touched-point and \
+         --touched-sigma state it). The errors in mm here are those of the target; a tool whose tip is {TIP_MM:.0} mm from it may be \
+         off by a further {:.3} mm (1 sigma), in proportion to its distance. To see it, measure two or three more poses with the \
+         flange turned by 30° or more about different axes",
         tip_mm(estimated)
     ))
 }

@@ -5,7 +5,7 @@
 //! explains the readings as well as the links, or there are too few rows for their noise. A doubtful model is written only on
 //! request, and every use of it says so.
 
-use crate::identification::benefit::{Benefit, LawError, ScaleError};
+use crate::identification::benefit::{Benefit, LawError, NoBenefit, ScaleError};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::sensor_laws::SensorLaw;
 use crate::identification::tolerance::Tolerance;
@@ -99,9 +99,11 @@ impl VerdictBuilder {
         ));
     }
 
-    /// Fails if the held-out error increased (RMSE in mm).
+    /// Fails if the held-out error increased or is unknown (RMSE in mm).
     pub fn check_held_out(&mut self, registered_mm: f64, model_mm: f64) {
-        if model_mm > registered_mm {
+        if registered_mm.is_nan() || model_mm.is_nan() {
+            self.fail("the held-out error is unknown: no row was held out, or an error is not a number");
+        } else if model_mm > registered_mm {
             self.fail(format!(
                 "on held-out rows the estimated geometry is worse than registered frames alone: {model_mm:.3} against \
                  {registered_mm:.3} mm RMSE"
@@ -128,10 +130,13 @@ impl VerdictBuilder {
     }
 
     /// Adds doubts if the benefit is uncertain, with the reason.
-    pub fn check_benefit(&mut self, benefit: Option<&Benefit>, sensor: Sensor) {
-        let Some(found) = benefit else {
-            self.doubt("the benefit for programs cannot be computed: the normal equations are singular");
-            return;
+    pub fn check_benefit(&mut self, benefit: Result<&Benefit, &NoBenefit>, sensor: Sensor) {
+        let found = match benefit {
+            Ok(found) => found,
+            Err(why) => {
+                self.doubt(why.to_string());
+                return;
+            }
         };
         let sentence = benefit_sentence(found);
         if found.probability >= MIN_PROBABILITY {
@@ -180,7 +185,7 @@ impl VerdictBuilder {
         if status == Judgement::Fail
             && let Some(benefit) = self.benefit.and_then(|k| self.others.get_mut(k))
         {
-            benefit.insert_str(0, "if what is said above were not so: ");
+            benefit.insert_str(0, "apart from the problems above: ");
         }
         reasons.append(&mut self.others);
         Verdict { status, reasons }
@@ -216,19 +221,24 @@ fn spoils(scale: &ScaleError) -> bool {
 /// ```
 pub fn percent_of(probability: f64) -> String {
     match 100.0 * probability {
-        p if p > 99.9 => "over 99.9 %".to_owned(),
-        p if p < 0.1 => "under 0.1 %".to_owned(),
+        p if p > MOST_PERCENT => "over 99.9 %".to_owned(),
+        p if p < LEAST_PERCENT => "under 0.1 %".to_owned(),
         p => format!("{p:.1} %"),
     }
 }
+
+/// Probabilities (%) beyond which [`percent_of`] states a bound.
+pub const LEAST_PERCENT: f64 = 0.1;
+/// The upper one.
+pub const MOST_PERCENT: f64 = 99.9;
 
 /// The expected benefit in words.
 fn benefit_sentence(found: &Benefit) -> String {
     let probability = percent_of(found.probability);
     format!(
-        "inside the measured region, apart from the placement of base and flange, the expected RMS error is {:.3} mm for the \
-         nominal arm and {:.3} mm for the estimated one{}: it improves programs with a probability of {probability} (at least \
-         {:.0} % is required)",
+        "inside the measured region, placement of base and flange excluded, the expected RMS error is {:.3} mm for the nominal arm \
+         and {:.3} mm for the estimated one{}: it improves programs with a probability of {probability} (at least {:.0} % is \
+         required)",
         found.nominal_mm,
         found.estimated_mm,
         scale_clause(found) + &beyond_noise_clause(found),
@@ -255,9 +265,7 @@ fn beyond_noise_clause(found: &Benefit) -> String {
     let Some(beyond) = found.beyond_noise else { return String::new() };
     let mut out = match beyond.known_mm() {
         Some(mm) if mm > 0.5 * found.estimated_mm => {
-            format!(
-                ", {mm:.3} mm of it from effects that the model does not contain, as the readings show beyond their noise"
-            )
+            format!(", of which {mm:.3} mm come from effects that the model does not contain")
         }
         _ => String::new(),
     };
@@ -267,7 +275,7 @@ fn beyond_noise_clause(found: &Benefit) -> String {
     let further_mm = (most_mm.powi(2) - least_mm.powi(2)).max(0.0).sqrt();
     if further_mm > found.estimated_mm {
         out += &format!(
-            ", or up to {:.3} mm if what the readings still deviate is the arm's and not noise, which repeated poses would tell",
+            ", or up to {:.3} mm if the unexplained rest is the arm's and not noise (repeated poses would show it)",
             further_mm.hypot(found.estimated_mm)
         );
     }
@@ -297,19 +305,21 @@ fn law_sentence(law: &LawError) -> String {
     let (error, remedy) = match law.kind {
         SensorLaw::Pulley => (
             "a cable that runs over a pulley at its outlet, of a radius of some 10 mm,",
-            "measure poses that turn the cable more widely about its outlet, best random ones all over the ranges of the joints, or some more with \
-             the outlet elsewhere; a cable that leaves its sensor through a small hole has no such error",
+            "measure poses that swing the cable further about its outlet (random poses over the full ranges of the joints, or some \
+             with the outlet elsewhere); a cable that leaves its sensor through a small hole has no such error",
         ),
         SensorLaw::Drum => (
             "a cable whose length is wound on in layers",
-            "measure poses at more directions of the cable for each of its lengths, best random ones all over the ranges of the joints, and the \
-             sensor itself against a known length",
+            "measure poses at more directions of the cable for each of its lengths (random poses over the full ranges of the joints), \
+             and the sensor itself against a known length",
         ),
     };
     let explains = if law.probability > FOUND {
         format!("{error} explains these readings better than the arm alone")
     } else {
-        format!("these poses do not tell the arm from its sensor: {error} would read much the same")
+        format!(
+            "these poses cannot separate the arm from its sensor: {error} would give nearly the same readings"
+        )
     };
     let helps = law.benefit_with.map_or_else(String::new, |with| {
         format!(", and with it the model improves programs with a probability of {} only", percent_of(with))
@@ -320,12 +330,12 @@ fn law_sentence(law: &LawError) -> String {
 fn remedy(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Cable => {
-            "check millimetres per count of the draw-wire and measure a known length with it; correct the readings, or state how well the length \
-             was met (--sensor-scale-sigma), and identify again"
+            "measure a known length with the draw-wire and check its millimetres per count; correct the readings, or state how well \
+             the length agreed (--sensor-scale-sigma), and identify again"
         }
         Sensor::Position | Sensor::Pose => {
-            "check unit, scale and atmosphere of the tracker and measure a known length (a scale bar) with it; correct the readings, or state how \
-             well the length was met (--sensor-scale-sigma), and identify again"
+            "measure a known length (a scale bar) with the tracker and check its unit, scale and atmosphere; correct the readings, or \
+             state how well the length agreed (--sensor-scale-sigma), and identify again"
         }
     }
 }

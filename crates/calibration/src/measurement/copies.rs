@@ -2,22 +2,22 @@
 //! time or session.
 //!
 //! A copy says nothing new, but counts as a further measurement: it pulls the fit towards its pose. Two readings of one pose at different
-//! times, or without a clock, can also be equal by chance, where the sensor's steps are coarse; see [`split::repeats_agree_by_chance`].
+//! times, or without a clock, can also be equal by chance, where the sensor's steps are coarse; see [`noise_floor::repeats_agree_by_chance`].
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::dataset::{Dataset, Row};
+use super::noise_floor;
 use super::row_list::row_list;
-use super::split;
 use truegrind_arm::condition::Condition;
 
 /// The rows without copies, with a note on those left out.
 pub(super) fn without_copies(dataset: Dataset) -> Dataset {
     let mut copies = copies(&dataset);
-    if copies.iter().any(|copy| copy.clock != Clock::Same) && split::repeats_agree_by_chance(&dataset) {
+    if copies.iter().any(|copy| copy.clock != Clock::Same) && noise_floor::repeats_agree_by_chance(&dataset) {
         copies.retain(|copy| copy.clock == Clock::Same);
     }
-    if copies.iter().any(|copy| copy.clock == Clock::Other) && split::repeats_may_all_agree(&dataset) {
+    if copies.iter().any(|copy| copy.clock == Clock::Other) && noise_floor::repeats_may_all_agree(&dataset) {
         copies.retain(|copy| copy.clock != Clock::Other);
     }
     let copies: Vec<usize> = copies.into_iter().map(|copy| copy.row).collect();
@@ -30,7 +30,7 @@ pub(super) fn without_copies(dataset: Dataset) -> Dataset {
     let mut out = dataset.subset(&indices);
     let numbers: Vec<usize> = copies.iter().map(|&i| dataset.rows[i].number).collect();
     out.notes.push(format!(
-        "{} of earlier rows, equal to the last digit of the reading, and left out: a copy is no further measurement",
+        "{} of earlier rows, identical to the last digit of the reading, and left out",
         if numbers.len() == 1 {
             format!("{} is a copy", row_list(&numbers))
         } else {

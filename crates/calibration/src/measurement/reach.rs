@@ -33,8 +33,8 @@ pub(super) fn without_impossible_readings(dataset: &mut Dataset, nominal: &Model
     let farthest = left_out.iter().map(|&i| (places[i] - middle).norm()).fold(0.0, f64::max);
     *dataset = dataset.subset(&kept);
     dataset.notes.push(format!(
-        "{} left out: {} {farthest:.0} mm from the median of all, and with any pose of this arm {diameter_mm:.0} mm are the most; a sensor that \
-         is out of range may write such numbers",
+        "{} left out: {} {farthest:.0} mm from the median of all, and this arm reaches {diameter_mm:.0} mm at most; a sensor that is \
+         out of range may write such numbers",
         row_list(&numbers),
         if numbers.len() == 1 { "its reading is" } else { "their readings are up to" }
     ));

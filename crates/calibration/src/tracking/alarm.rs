@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use truegrind_arm::parameter::{Parameter, display_unit};
 
 /// One of several parameters that moved at once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -35,6 +36,40 @@ pub enum Course {
     Burst,
     /// The readings scatter more than before: `shift` is the ratio.
     Scatter,
+}
+
+/// What can be moved as a whole. An alarm of it has its words for a parameter, in files too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mount {
+    /// The sensor, or the arm's base: readings show only that one moved against the other.
+    Sensor,
+    /// The target on the flange.
+    Target,
+    /// The outlet of a cable, counted from 0.
+    Outlet(usize),
+}
+
+impl Mount {
+    /// What a parameter is part of.
+    pub fn of(parameter: &Parameter) -> Option<Self> {
+        match parameter {
+            Parameter::SensorFrame(_) => Some(Mount::Sensor),
+            Parameter::Target(_) => Some(Mount::Target),
+            Parameter::Outlet { anchor, .. } => Some(Mount::Outlet(*anchor)),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Mount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Mount::Sensor => f.write_str("the sensor against the arm's base"),
+            Mount::Target => f.write_str("the touched point"),
+            Mount::Outlet(0) => f.write_str("the outlet"),
+            Mount::Outlet(anchor) => write!(f, "outlet {}", anchor + 1),
+        }
+    }
 }
 
 /// A detected change.
@@ -80,6 +115,13 @@ pub struct Alarm {
     pub parts: Vec<Part>,
 }
 
+impl Alarm {
+    /// Whether `mount` moved as a whole.
+    pub fn is_of(&self, mount: Mount) -> bool {
+        self.parameter == mount.to_string()
+    }
+}
+
 /// Value and standard deviation with the digits that tell something: two of the standard deviation, four decimals where these are enough.
 fn with_sigma(value: f64, sigma: f64) -> String {
     let places = if sigma > 0.0 && sigma.is_finite() { 1.0 - sigma.log10().floor() } else { 4.0 };
@@ -95,15 +137,6 @@ fn with_sigma(value: f64, sigma: f64) -> String {
 
 /// Most decimals without an exponent.
 const MOST_DECIMALS: f64 = 6.0;
-
-/// Factor to the displayed unit, and that unit.
-fn display_unit(unit: &str) -> (f64, &str) {
-    match unit {
-        "rad" => (1f64.to_degrees(), "°"),
-        "" => (1.0, ""),
-        other => (1.0, other),
-    }
-}
 
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -153,7 +186,7 @@ impl fmt::Display for Alarm {
         write!(f, "{name} {verb}")?;
         let is_whole = !self.parts.is_empty();
         if is_whole && self.shift < 2.0 * self.sigma {
-            write!(f, ", by how much the poses do not tell yet,")?;
+            write!(f, ", by an amount that the poses do not show yet,")?;
         } else {
             let whole = if is_whole { ", which moved the readings" } else { "" };
             write!(f, "{whole} by {} {unit}", with_sigma(self.shift * scale, self.sigma * scale))?;

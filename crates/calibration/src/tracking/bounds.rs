@@ -1,6 +1,6 @@
 //! Bounds of the normalised innovations.
 
-use truegrind_math::distribution::chi_square_quantile;
+use truegrind_math::distribution::{chi_square_quantile, wilson_hilferty};
 
 /// Tail probability beyond which a pose is an outlier.
 const ACCIDENT: f64 = 1e-9;
@@ -9,7 +9,7 @@ const ACCIDENT: f64 = 1e-9;
 const ALARM_DEVIATIONS: f64 = 4.265;
 
 /// The NIS beyond which a pose of `rows` rows is an outlier: the χ² quantile, computed once.
-pub(super) fn accident_bound(rows: usize) -> f64 {
+pub(super) fn outlier_bound(rows: usize) -> f64 {
     use std::sync::OnceLock;
     static CUTS: OnceLock<[f64; 7]> = OnceLock::new();
     let cuts = CUTS
@@ -17,10 +17,8 @@ pub(super) fn accident_bound(rows: usize) -> f64 {
     cuts[rows.min(6)]
 }
 
-/// Bound of the NIS sum of `rows` rows by the Wilson–Hilferty approximation (1931): accurate to a per cent here, and cheap
-/// enough for every pose.
+/// Bound of the NIS sum of `rows` rows by an approximation that is cheap enough for every pose.
 pub(super) fn window_bound(rows: usize) -> f64 {
-    let (n, z) = (rows as f64, ALARM_DEVIATIONS);
-    let spread = 2.0 / (9.0 * n);
-    n * (1.0 - spread + z * spread.sqrt()).powi(3)
+    let n = rows as f64;
+    n * wilson_hilferty(n, ALARM_DEVIATIONS)
 }

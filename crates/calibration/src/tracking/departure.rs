@@ -1,7 +1,7 @@
 //! How far the arm has moved from the model that the track began with, whether or not an alarm was raised.
 //!
 //! A drift may be slower than any bound of the innovations, since the filter follows it. Programs were corrected with the first model, so
-//! what counts for them is the whole way since. It is the displacement of the target over the measured region, after its best placement:
+//! the total change since then is what counts for them. It is the displacement of the target over the measured region, after its best placement:
 //! a motion of the base and of the target's mounting is not the arm's shape. A turn about axis 1 that the sensor saw counts by itself
 //! (`turn`).
 //!
@@ -17,8 +17,9 @@ use nalgebra::{DMatrix, Rotation3, Vector3};
 use super::alarm::{Alarm, Course};
 use super::tracker::Tracker;
 use super::turn::{Turn, is_of_joint_1};
-use crate::identification::placement::{fill, place};
+use crate::identification::rigid_motion_columns::{fill, place};
 use truegrind_arm::model::{Joints, Model};
+use truegrind_math::distribution::wilson_hilferty;
 
 /// The arm as tracked against the model that the track began with.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,17 +30,29 @@ pub struct Departure {
     pub expected_mm: f64,
     /// Displacement since the first poses of the track, and what the uncertainties make of it (mm).
     pub since_first_poses_mm: Option<[f64; 2]>,
-    /// Parameters that moved by more than four of the standard deviations that they began with: name, unit, by how much, and the present
-    /// standard deviation; those that moved most first.
-    pub parameters: Vec<(String, String, f64, f64)>,
+    /// Parameters that moved by more than four of the standard deviations that they began with, those that moved most first.
+    pub parameters: Vec<MovedParameter>,
     /// A turn about axis 1 against the sensor, which is not part of the distances.
     pub turn: Option<Turn>,
     /// An earlier or present alarm that tells a change of the arm.
-    pub told: Option<Alarm>,
+    pub reported: Option<Alarm>,
     /// Whether the arm has another shape now.
     pub is_of_shape: bool,
     /// Whether the arm is another one now, by its shape or a turn.
     pub is_significant: bool,
+}
+
+/// A parameter of the arm that moved since the track began.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MovedParameter {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// By how much.
+    pub by: f64,
+    /// Present standard deviation.
+    pub sigma: f64,
 }
 
 /// Poses of the region that are compared.
@@ -102,13 +115,13 @@ impl Tracker {
             let covariance = start.covariance()?.view((0, 0), (arm, arm)).into_owned();
             Some(distance(&placed(&self.without_rows().apply(&start.x).0), &covariance))
         });
-        let noise_mm = self.state.sigma_mm * (self.state.sensor.scalars().min(3) as f64).sqrt();
-        let told = self.state.alarms.iter().rev().find(|alarm| self.tells_of_the_arm(alarm)).cloned();
+        let noise_mm = self.state.sigma_mm * (self.state.sensor.axes() as f64).sqrt();
+        let reported = self.state.alarms.iter().rev().find(|alarm| self.tells_of_the_arm(alarm)).cloned();
         // Joint 1 moves no shape: a turn about its axis counts by itself.
-        let told_of_shape =
+        let reported_of_shape =
             self.state.alarms.iter().any(|alarm| self.tells_of_the_arm(alarm) && !is_of_joint_1(alarm));
         let sigmas = self.sigmas();
-        let mut parameters: Vec<(f64, (String, String, f64, f64))> = self
+        let mut parameters: Vec<(f64, MovedParameter)> = self
             .initial
             .order
             .iter()
@@ -116,24 +129,25 @@ impl Tracker {
             .filter_map(|(k, parameter)| {
                 let (moved, first) = (self.filter.x[k], self.initial.covariance[(k, k)].max(0.0).sqrt());
                 let counts = moved.abs() > PARAMETER_SIGMAS * first;
-                let told = (parameter.to_string(), parameter.unit().to_owned(), moved, sigmas[k]);
-                counts.then_some((moved.abs() / first.max(f64::MIN_POSITIVE), told))
+                let (name, unit) = (parameter.to_string(), parameter.unit().to_owned());
+                let parameter = MovedParameter { name, unit, by: moved, sigma: sigmas[k] };
+                counts.then_some((moved.abs() / first.max(f64::MIN_POSITIVE), parameter))
             })
             .collect();
         parameters.sort_by(|a, b| b.0.total_cmp(&a.0));
         let turn = self.turn(&poses);
         let is_of_shape = whole.is_beyond(SHARE * self.initial.geometry.held_out.rmse)
             || since.as_ref().is_some_and(|since| since.is_beyond(SHARE * noise_mm))
-            || (told_of_shape && std::iter::once(&whole).chain(&since).any(|d| d.rms_mm > d.expected_mm));
+            || (reported_of_shape && std::iter::once(&whole).chain(&since).any(|d| d.rms_mm > d.expected_mm));
         Some(Departure {
             rms_mm: whole.rms_mm,
             expected_mm: whole.expected_mm,
             since_first_poses_mm: since.as_ref().map(|since| [since.rms_mm, since.expected_mm]),
-            parameters: parameters.into_iter().map(|(_, told)| told).collect(),
+            parameters: parameters.into_iter().map(|(_, parameter)| parameter).collect(),
             is_of_shape,
             is_significant: is_of_shape || turn.as_ref().is_some_and(|turn| turn.is_significant),
             turn,
-            told,
+            reported,
         })
     }
 }
@@ -165,8 +179,7 @@ impl Distance {
         // Σλ is the trace of the Gram matrix, Σλ² the square of its norm.
         let gram = axes.tr_mul(&axes);
         let freedom = (gram.trace().powi(2) / gram.norm_squared()).max(1.0);
-        let spread = 2.0 / (9.0 * freedom);
-        let factor = (1.0 - spread + DEVIATIONS * spread.sqrt()).powi(3).sqrt();
+        let factor = wilson_hilferty(freedom, DEVIATIONS).sqrt();
         let rms = |square: f64| (square / poses as f64).sqrt();
         let expected_mm = rms(gram.trace());
         Self { rms_mm: rms(columns.column(0).norm_squared()), expected_mm, bound_mm: factor * expected_mm }

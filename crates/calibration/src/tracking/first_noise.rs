@@ -53,7 +53,7 @@ impl FirstPoses {
         options: &Options,
     ) -> Result<Self, TrackError> {
         let dataset = &observed.dataset;
-        let axes: f64 = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+        let axes = dataset.sensor.axes() as f64;
         let unexplained_mm = model.geometry.held_out.rmse / axes.sqrt();
         let (kept, fitted) = robust_registration(model, observed, unexplained_mm)?;
         // Residuals of the few poses that registered the sensor underestimate the noise; the held-out error of the

@@ -25,6 +25,7 @@
 //!
 //! **Checked against** least squares with the change as an additional parameter.
 
+use super::alarm::Mount;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use truegrind_math::distribution::ln_gamma;
 
@@ -74,8 +75,8 @@ impl Change {
 /// Parameters that can move together, each with its prior standard deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// Its name.
-    pub name: String,
+    /// What they place.
+    pub mount: Mount,
     /// Index and prior standard deviation of each parameter.
     pub members: Vec<(usize, f64)>,
     /// Parameters that move the readings only as the members together can, each with the largest size that is a likely rival.

@@ -61,7 +61,7 @@ impl Tracker {
         let mut reasons = vec![format!(
             "tracked over {} poses since {}, {} set aside as outliers; held-out errors are those of the first \
              identification",
-            self.state.poses, self.initial.provenance.file, self.state.accidents
+            self.state.poses, self.initial.provenance.file, self.state.outliers
         )];
         reasons.extend(self.state.alarms.iter().map(ToString::to_string));
         reasons

@@ -7,12 +7,11 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-use super::alarm::{Alarm, Course, Part};
-use super::bounds::accident_bound;
+use super::alarm::{Alarm, Course, Mount, Part};
+use super::bounds::outlier_bound;
 use super::gauge::Gauge;
 use super::state::{PoseRecord, Snapshot, extend_region};
 use super::tracker::Tracker;
-use super::turn::SENSOR;
 use crate::identification::calibration::Frames;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::registration::points;
@@ -69,14 +68,14 @@ struct Remount {
 
 impl Tracker {
     /// Number of consecutive outliers at the end of the history.
-    pub(super) fn trailing_accidents(&self) -> usize {
-        let bound = accident_bound(self.state.sensor.scalars());
+    pub(super) fn trailing_outliers(&self) -> usize {
+        let bound = outlier_bound(self.state.sensor.scalars());
         self.state.history.iter().rev().take_while(|record| !(record.nis <= bound)).count()
     }
 
     /// If the latest poses agree on a remounted target or sensor, continues the track there and returns the alarm.
     pub(super) fn detect_remount(&mut self, beside: Beside) -> Option<Alarm> {
-        let run = self.trailing_accidents();
+        let run = self.trailing_outliers();
         if run < FEWEST || self.state.sensor == Sensor::Cable {
             return None;
         }
@@ -173,7 +172,7 @@ impl Tracker {
             record.nis = taken.nis;
             record.error_mm = self.error_mm(&problem, at, record.per_mm);
             if !taken.set_aside {
-                self.state.accidents = self.state.accidents.saturating_sub(1);
+                self.state.outliers = self.state.outliers.saturating_sub(1);
                 extend_region(&mut self.state.region, &record.joints);
             }
         }
@@ -199,8 +198,8 @@ fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Al
         since_row: first.row,
         since_time_h: first.time_h,
         parameter: match found.what {
-            Mounted::Target => "the touched point".to_owned(),
-            Mounted::Sensor => SENSOR.to_owned(),
+            Mounted::Target => Mount::Target.to_string(),
+            Mounted::Sensor => Mount::Sensor.to_string(),
         },
         label: None,
         unit: "mm".to_owned(),

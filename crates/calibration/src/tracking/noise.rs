@@ -132,12 +132,12 @@ impl Tracker {
         }
         let mut poses: Vec<PoseRecord> = std::mem::take(&mut other.state.history);
         let problem = other.problem(&poses);
-        other.state.accidents = 0;
+        other.state.outliers = 0;
         for (at, record) in poses.iter_mut().enumerate() {
             let taken = other.update(&problem, at);
             record.nis = taken.nis;
             record.error_mm = other.error_mm(&problem, at, record.per_mm);
-            other.state.accidents += usize::from(taken.set_aside);
+            other.state.outliers += usize::from(taken.set_aside);
         }
         other.state.history = poses;
         Some(other)

@@ -2,15 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::alarm::{Alarm, Course, Part};
-use super::bounds::{accident_bound, window_bound};
+use super::alarm::{Alarm, Course, Mount, Part};
+use super::bounds::{outlier_bound, window_bound};
 use super::locate::{ALTERNATIVE_MARGIN, Change, Explanation, Form, Group, GroupChange, locate};
 use super::mounting::Beside;
 use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
-use super::turn::SENSOR;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
+use truegrind_math::distribution::wilson_hilferty;
 use truegrind_math::statistics::median;
 
 /// Smallest likelihood ratio of a change that is reported: 1 in 10⁵ for one parameter and one pose, 1 in a hundred after the
@@ -51,7 +51,7 @@ impl Tracker {
         let bound = window_bound(window * per);
         // An isolated outlier is ignored; three or four consecutive ones exceed the bound.
         let counted = |at: usize| match history[at].nis {
-            _ if self.is_lone_accident(at) => per as f64,
+            _ if self.is_lone_outlier(at) => per as f64,
             nis if nis.is_finite() => nis.min(bound / 4.0),
             _ => bound / 4.0,
         };
@@ -73,7 +73,7 @@ impl Tracker {
         // Excess scatter is no change of a parameter, however well one fits a few poses: a change must explain most (0.7) of
         // the window's excess.
         let measured = |at: usize| match history[at].nis {
-            _ if self.is_lone_accident(at) => per as f64,
+            _ if self.is_lone_outlier(at) => per as f64,
             nis if nis.is_finite() => nis,
             _ => bound,
         };
@@ -84,9 +84,9 @@ impl Tracker {
             if let Some(alarm) = self.detect_remount(Beside::ChangedArm) {
                 return Some(alarm);
             }
-            if self.trailing_accidents() > SETTLE {
+            if self.trailing_outliers() > SETTLE {
                 let alarm =
-                    self.unexplained_alarm(Course::Burst, self.trailing_accidents(), [sum, bound], ratio);
+                    self.unexplained_alarm(Course::Burst, self.trailing_outliers(), [sum, bound], ratio);
                 self.state.burst_since = self.state.poses;
                 return alarm;
             }
@@ -131,9 +131,13 @@ impl Tracker {
     pub(super) fn scatter(&self, poses: usize) -> Option<f64> {
         let history = &self.state.history;
         let latest: Vec<f64> = history[history.len().saturating_sub(poses)..].iter().map(|s| s.nis).collect();
+        Some((median(&latest)? / self.expected_median_nis()).sqrt())
+    }
+
+    /// The median of a pose's NIS, if arm, sensor and noise match the model.
+    pub fn expected_median_nis(&self) -> f64 {
         let degrees = self.state.sensor.scalars() as f64;
-        let expected = degrees * (1.0 - 2.0 / (9.0 * degrees)).powi(3);
-        Some((median(&latest)? / expected).sqrt())
+        degrees * wilson_hilferty(degrees, 0.0)
     }
 
     /// Alarm of an explained change.
@@ -171,7 +175,7 @@ impl Tracker {
                 .alternatives
                 .iter()
                 .map(|c| name(c.parameter))
-                .chain(found.nearly.map(|g| format!("a move of {}", groups[g].name)))
+                .chain(found.nearly.map(|g| format!("a move of {}", groups[g].mount)))
                 .collect(),
             window_nis,
             parts: Vec::new(),
@@ -214,11 +218,11 @@ impl Tracker {
 
     /// During a burst the only alarm is a remounted target or sensor. The burst ends after [`SETTLE`] consecutive poses that fit.
     fn continue_burst(&mut self) -> Option<Alarm> {
-        let run = self.trailing_accidents();
+        let run = self.trailing_outliers();
         if run > 0 {
             return run.is_multiple_of(SETTLE).then(|| self.detect_remount(Beside::ChangedArm)).flatten();
         }
-        let bound = accident_bound(self.state.sensor.scalars());
+        let bound = outlier_bound(self.state.sensor.scalars());
         let fitting = self.state.history.iter().rev().take_while(|record| record.nis <= bound).count();
         if fitting >= SETTLE {
             self.state.burst_since = 0;
@@ -247,7 +251,8 @@ impl Tracker {
         };
         alarm.parts = group.members.iter().enumerate().map(part).collect();
         (alarm.shift, alarm.sigma) = self.displacement(group, together);
-        (alarm.parameter, alarm.unit, alarm.course) = (group.name.clone(), "mm".to_owned(), Course::Jump);
+        (alarm.parameter, alarm.unit, alarm.course) =
+            (group.mount.to_string(), "mm".to_owned(), Course::Jump);
         alarm.label = None;
         let rivals = group.covers.iter().filter(|(k, largest)| {
             let near = |change: &&Change| change.parameter == *k && change.shift.abs() <= *largest;
@@ -291,21 +296,15 @@ impl Tracker {
     fn groups(&self) -> Vec<Group> {
         let mut groups: Vec<Group> = Vec::new();
         for (k, parameter) in self.parameters.iter().enumerate() {
-            let name = match parameter {
-                Parameter::SensorFrame(_) => SENSOR.to_owned(),
-                Parameter::Target(_) => TOUCHED_POINT.to_owned(),
-                Parameter::Outlet { anchor: 0, .. } => "the outlet".to_owned(),
-                Parameter::Outlet { anchor, .. } => format!("outlet {}", anchor + 1),
-                _ => continue,
-            };
+            let Some(mount) = Mount::of(parameter) else { continue };
             let reach = if parameter.is_length() { REACH_MM } else { REACH_RAD };
-            match groups.iter_mut().find(|g| g.name == name) {
+            match groups.iter_mut().find(|group| group.mount == mount) {
                 Some(group) => group.members.push((k, reach)),
-                None => groups.push(Group { name, members: vec![(k, reach)], covers: Vec::new() }),
+                None => groups.push(Group { mount, members: vec![(k, reach)], covers: Vec::new() }),
             }
         }
         // Whatever is fixed to the last link moves with it: no reading tells a bent flange or a lost zero of joint 6 from a moved target.
-        if let Some(target) = groups.iter_mut().find(|group| group.name == TOUCHED_POINT) {
+        if let Some(target) = groups.iter_mut().find(|group| group.mount == Mount::Target) {
             let carried = self.parameters.iter().enumerate();
             target.covers =
                 carried.filter_map(|(k, parameter)| Some((k, largest_of_last_link(parameter)?))).collect();
@@ -314,8 +313,8 @@ impl Tracker {
     }
 
     /// Whether a pose of the history is an isolated outlier. After a jump, consecutive poses are outliers.
-    fn is_lone_accident(&self, at: usize) -> bool {
-        let bound = accident_bound(self.state.sensor.scalars());
+    fn is_lone_outlier(&self, at: usize) -> bool {
+        let bound = outlier_bound(self.state.sensor.scalars());
         let aside = |at: Option<usize>| {
             at.and_then(|at| self.state.history.get(at)).is_some_and(|s| !(s.nis <= bound))
         };
@@ -330,7 +329,7 @@ impl Tracker {
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
         self.problem(poses).jacobian(&reference.x, 0..rows, &mut r, &mut j);
         for (pose, record) in poses.iter().enumerate() {
-            if self.is_lone_accident(pose) || !record.nis.is_finite() {
+            if self.is_lone_outlier(pose) || !record.nis.is_finite() {
                 let of_pose = pose * per..(pose + 1) * per;
                 r[of_pose.clone()].fill(0.0);
                 j.chunks_mut(rows).for_each(|column| column[of_pose.clone()].fill(0.0));
@@ -347,7 +346,7 @@ impl Tracker {
         let poses = std::mem::take(&mut self.state.history);
         let problem = self.problem(&poses);
         let single = found.together.is_none();
-        let bound = accident_bound(self.state.sensor.scalars());
+        let bound = outlier_bound(self.state.sensor.scalars());
         // What moves the readings exactly as the sensor does is the sensor: see `compare_changes`.
         let is_same = |change: &Change| {
             !self.parameters[found.best.parameter].is_of_arm()
@@ -384,7 +383,7 @@ impl Tracker {
             }
             let taken = !self.update(&problem, at).set_aside;
             if taken && !(poses[at].nis <= bound) {
-                self.state.accidents = self.state.accidents.saturating_sub(1);
+                self.state.outliers = self.state.outliers.saturating_sub(1);
                 extend_region(&mut self.state.region, &poses[at].joints);
             }
         }
@@ -411,6 +410,3 @@ fn largest_of_last_link(parameter: &Parameter) -> Option<f64> {
 const ZERO_LOST_RAD: f64 = 0.09;
 const BENT_RAD: f64 = 0.003;
 const BENT_MM: f64 = 0.3;
-
-/// What the target is called.
-const TOUCHED_POINT: &str = "the touched point";

@@ -119,7 +119,8 @@ pub struct State {
     /// Poses processed.
     pub poses: usize,
     /// Poses rejected as outliers.
-    pub accidents: usize,
+    #[serde(rename = "accidents")]
+    pub outliers: usize,
     /// Settings.
     pub options: Options,
     pub(super) outlets_mm: Vec<[f64; 3]>,

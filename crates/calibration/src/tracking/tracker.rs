@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::alarm::{Alarm, Course};
-use super::bounds::accident_bound;
+use super::bounds::outlier_bound;
 use super::error::TrackError;
 use super::first_noise::FirstPoses;
 use super::gauge::Gauge;
@@ -120,7 +120,7 @@ impl Tracker {
             model_hash: model_hash.to_owned(),
             sensor: dataset.sensor,
             poses: 0,
-            accidents: 0,
+            outliers: 0,
             options: options.clone(),
             outlets_mm: frames.outlets_mm.iter().map(|o| (*o).into()).collect(),
             zeros_mm: frames.zeros_mm.clone(),
@@ -249,7 +249,7 @@ impl Tracker {
         let taken = self.update(problem, at);
         record.nis = taken.nis;
         self.state.poses += 1;
-        self.state.accidents += usize::from(taken.set_aside);
+        self.state.outliers += usize::from(taken.set_aside);
         record.error_mm = self.error_mm(problem, at, record.per_mm);
         if !taken.set_aside {
             extend_region(&mut self.state.region, &record.joints);
@@ -305,7 +305,7 @@ impl Tracker {
         }
         let finite = nis.is_finite() && trial.x.iter().all(|x| x.is_finite());
         // NaN is rejected too.
-        let set_aside = !(finite && nis <= accident_bound(per));
+        let set_aside = !(finite && nis <= outlier_bound(per));
         if !set_aside {
             self.filter = trial;
         }
@@ -374,7 +374,7 @@ impl Tracker {
 
     /// Whether the track is unreliable: more than one pose in ten was rejected.
     pub fn mostly_set_aside(&self) -> bool {
-        self.state.accidents > FEW_ACCIDENTS && 10 * self.state.accidents > self.state.poses
+        self.state.outliers > FEW_OUTLIERS && 10 * self.state.outliers > self.state.poses
     }
 
     /// The state to save.
@@ -405,7 +405,7 @@ impl Tracker {
 }
 
 /// Up to this number of outliers a track is reliable whatever their share.
-const FEW_ACCIDENTS: usize = 5;
+const FEW_OUTLIERS: usize = 5;
 
 /// Added to the model's variances, as its covariance can be singular to rounding; negligible beside any tolerance (mm², rad²).
 const SMALLEST_VARIANCE: f64 = 1e-14;

@@ -10,11 +10,11 @@
 //! (`gauge`) does not enter it; its variance is gᵀ(P₁ + P₂)g, g by differences, as if both states were independent, which makes it larger.
 //!
 //! A rigid motion of which the turn leaves more than a share ([`UNLIKE`]) is another one: of a sensor that was knocked or sinks. After such an
-//! alarm the placement is taken down anew; a turn that was told before stays, since nothing tells that it was put right.
+//! alarm the placement is taken down anew; an earlier turn stays in force, since no reading shows that it was repaired.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use super::alarm::{Alarm, Course};
+use super::alarm::{Alarm, Course, Mount};
 use super::tracker::Tracker;
 use crate::measurement::dataset::Sensor;
 use truegrind_arm::model::Joints;
@@ -29,8 +29,8 @@ pub struct Turn {
     pub sigma_rad: f64,
     /// What it moves, RMS over the measured region (mm).
     pub rms_mm: f64,
-    /// The alarm that told it.
-    pub told: Option<Alarm>,
+    /// The alarm that reported it.
+    pub reported: Option<Alarm>,
     /// Whether it counts.
     pub is_significant: bool,
 }
@@ -38,8 +38,8 @@ pub struct Turn {
 /// Normal quantile of the bound: 1 in 10 000.
 const DEVIATIONS: f64 = 3.9;
 
-/// The same for a turn that an alarm told: it counts until it is put right.
-const DEVIATIONS_TOLD: f64 = 2.0;
+/// The same for a turn that an alarm reported: it counts until it is put right.
+const DEVIATIONS_REPORTED: f64 = 2.0;
 
 /// Share of the turn's RMS displacement that the rest of the rigid motion may have.
 const UNLIKE: f64 = 0.6;
@@ -57,21 +57,21 @@ impl Tracker {
         if self.state.sensor == Sensor::Cable {
             return None;
         }
-        let told = self.told_turn();
+        let reported = self.reported_turn();
         let seen = self.seen_turn(poses);
-        match (told, seen) {
+        match (reported, seen) {
             (Some((alarm, is_before_placement)), seen) => {
                 let lever_mm = self.lever_mm(poses);
                 let from_alarm = Turn {
                     angle_rad: alarm.shift,
                     sigma_rad: alarm.sigma,
                     rms_mm: alarm.shift.abs() * lever_mm,
-                    told: None,
+                    reported: None,
                     is_significant: true,
                 };
                 let mut turn = seen.filter(|_| !is_before_placement).unwrap_or(from_alarm);
-                turn.is_significant |= turn.angle_rad.abs() > DEVIATIONS_TOLD * turn.sigma_rad;
-                turn.told = Some(alarm);
+                turn.is_significant |= turn.angle_rad.abs() > DEVIATIONS_REPORTED * turn.sigma_rad;
+                turn.reported = Some(alarm);
                 Some(turn)
             }
             (None, seen) => seen,
@@ -79,7 +79,7 @@ impl Tracker {
     }
 
     /// The last alarm of joint 1, and whether the sensor was moved since.
-    fn told_turn(&self) -> Option<(Alarm, bool)> {
+    fn reported_turn(&self) -> Option<(Alarm, bool)> {
         let at = self.state.alarms.iter().rposition(is_of_joint_1)?;
         let moved = self.state.alarms[at..].iter().any(|alarm| self.is_of_sensor(alarm));
         Some((self.state.alarms[at].clone(), moved))
@@ -89,7 +89,7 @@ impl Tracker {
     pub(super) fn is_of_sensor(&self, alarm: &Alarm) -> bool {
         let is_sensor = |parameter: &Parameter| matches!(parameter, Parameter::SensorFrame(_));
         let named = |parameter: &&Parameter| is_sensor(parameter) && parameter.to_string() == alarm.parameter;
-        alarm.parameter == SENSOR || self.parameters.iter().any(|parameter| named(&parameter))
+        alarm.is_of(Mount::Sensor) || self.parameters.iter().any(|parameter| named(&parameter))
     }
 
     /// The distance of the target from axis 1, RMS (mm).
@@ -144,7 +144,7 @@ impl Tracker {
         let is_significant = angle_rad.abs() > DEVIATIONS * sigma_rad
             && rms_mm > SHARE * noise_mm
             && rms(rest) < UNLIKE * rms_mm;
-        Some(Turn { angle_rad, sigma_rad, rms_mm, told: None, is_significant })
+        Some(Turn { angle_rad, sigma_rad, rms_mm, reported: None, is_significant })
     }
 }
 
@@ -184,6 +184,3 @@ fn rigid_rest(points: &[Vector3<f64>], moved: &[Vector3<f64>], angle_rad: f64) -
     }
     Some(normal.cholesky()?.solve(&right).dot(&right))
 }
-
-/// What the sensor is called in alarms.
-pub(super) const SENSOR: &str = "the sensor against the arm's base";

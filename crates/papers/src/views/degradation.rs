@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use self::series::{SIMULATED, after_of, pose_counts};
 use super::words;
 use crate::degradation::{DegradationResult, Outcome, PaperStatement, Run, Strategy};
+use truegrind_math::sentence::capitalised;
 use truegrind_math::statistics::mean_and_deviation;
 use truegrind_report::document::{Block, Document, Verdict};
 use truegrind_report::number::Precision;
@@ -122,7 +123,7 @@ fn verdict(result: &DegradationResult) -> Verdict {
          computing time reflects the same ratio of rows."
             .to_owned(),
     );
-    Verdict::new(Status::Good, format!("{}: {}", capital(SIMULATED), headline(result)), reasons)
+    Verdict::new(Status::Good, format!("{}: {}", capitalised(SIMULATED), headline(result)), reasons)
 }
 
 /// Errors of RLS and LM with all identification poses of a group.
@@ -139,11 +140,6 @@ fn headline(result: &DegradationResult) -> String {
         more.name(),
         mm(of(more))
     )
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn groups(result: &DegradationResult) -> Table {

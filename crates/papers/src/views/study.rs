@@ -2,7 +2,6 @@
 
 use crate::experiment::{Treatment, Units};
 use crate::protocol::{MethodResult, Outcome, Study};
-use truegrind_calibration::measurement::dataset::Sensor;
 use truegrind_estimation::estimate::Termination;
 use truegrind_math::statistics::{ErrorSummary, median};
 
@@ -65,11 +64,7 @@ pub(super) fn treatment(result: &MethodResult) -> &'static str {
 
 /// Passes over the rows of the fit: residuals only, and with derivatives.
 pub(super) fn passes(study: &Study, result: &MethodResult) -> (f64, f64) {
-    let per = match study.sensor {
-        Sensor::Cable => 1,
-        Sensor::Position => 3,
-        Sensor::Pose => 6,
-    };
+    let per = study.sensor.scalars();
     let n = result.outcomes.len().max(1) as f64;
     let (mut residuals, mut jacobians) = (0.0, 0.0);
     for (outcome, case) in result.outcomes.iter().zip(&study.cases) {

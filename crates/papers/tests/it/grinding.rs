@@ -87,7 +87,7 @@ fn measured_rows_are_also_diagnosed() {
     // Causes beyond geometry are in the recipe.
     assert!(found.held_out.rmse < 1.05 * beside, "{} beside {beside} mm", found.held_out.rmse);
     // A method without a model in a case has no error, not one of zero.
-    result.rows[0].cases[0].held_out = ErrorSummary::default();
+    result.rows[0].cases[0].held_out = ErrorSummary::UNKNOWN;
     let results = Results::Grinding(Box::new(result));
     let page = format::html::document(&view::document(&experiment, &results, &view::Origin::default()));
     for words in ["named causes", "NC is not judged on the part"] {

@@ -6,6 +6,7 @@ use super::scene::MeasuredScene;
 use crate::markdown::{cell, line, number, with_sigma};
 use crate::shape::Shape;
 use truegrind_arm::estimated::{EstimatedParameter, Judgement};
+use truegrind_arm::parameter::display_unit;
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis};
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_math::statistics::ErrorSummary;
@@ -169,7 +170,7 @@ fn parameters(text: &mut String, parameters: &[EstimatedParameter]) {
          rest is manufacturing tolerance.\n\n| | nominal | change ± σ | data |\n|---|---:|---:|---:|\n",
     );
     for p in parameters {
-        let (factor, unit) = if p.unit == "rad" { (1f64.to_degrees(), "°") } else { (1.0, p.unit.as_str()) };
+        let (factor, unit) = display_unit(&p.unit);
         let _ = writeln!(
             text,
             "| {} [{}] | {} | {} | {:.0} % |",

@@ -1,6 +1,6 @@
 //! The answer of a diagnosis, on one screen: what was found, where, how sure that is, and what to do.
 
-use super::words::{and, confidence, family, located, member, sentence};
+use super::words::{confidence, family, located, member};
 use crate::document::{Block, Verdict};
 use crate::status::Status;
 use crate::table::{Column, Table};
@@ -8,12 +8,13 @@ use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::decision::DIAGNOSIS_FILE;
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, Finding};
 use truegrind_calibration::measurement::dataset::Sensor;
+use truegrind_math::sentence::{capitalised, counted, listed};
 
 /// How many causes were found, and what they gain.
 pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
     let sure = diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count();
     let further = diagnosis.findings.iter().filter(|f| is_possible(f)).count();
-    let causes = |n: usize| if n == 1 { "1 cause".to_owned() } else { format!("{n} causes") };
+    let causes = |n: usize| counted(n, "cause", "causes");
     let found = match (sure, further) {
         (0, 0) => "No cause beyond geometry was found".to_owned(),
         (0, n) => format!("No cause beyond geometry is certain, {n} {} possible", be(n)),
@@ -42,7 +43,8 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
             "the noise floor is unknown, since too few poses were repeated from the same sides".to_owned()
         }
         Some(floor) => format!(
-            "the rounding of the log alone makes {floor:.3} mm, the noise of the sensor is unknown, since too few poses were repeated from the same sides"
+            "rounding of the log alone accounts for {floor:.3} mm; the noise of the sensor is unknown, since too few poses were \
+             repeated from the same sides"
         ),
         None => format!("the noise floor is unknown, since {}", diagnosis.noise_floor_source),
     };
@@ -73,8 +75,8 @@ fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
     let source = if diagnosis.is_noise_measured() { "" } else { ", which is that of rounding alone" };
     let mut out = vec![
         format!(
-            "the held-out error{left} ({:.3} mm) is {times:.0} times the noise floor ({floor:.3} mm{source}): too much for noise; its cause is \
-             outside the catalogue or in the measurement",
+            "the held-out error{left} ({:.3} mm) is {times:.0} times the noise floor ({floor:.3} mm{source}), too much for noise: its \
+             cause is not in the catalogue, or lies in the measurement",
             diagnosis.fits.extended.cv_rmse_mm
         ),
         format!("what to check: {}", what_to_check(diagnosis.dataset.sensor)),
@@ -92,12 +94,12 @@ fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
 fn what_to_check(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Cable => {
-            "whether the cable runs free and its hook does not slip, whether it was wound in layers or over a pulley, whether the rows come \
-             from sessions with the outlet at different places, and the sensor itself against a known length"
+            "that the cable runs free and its hook holds, that it is wound in one layer and not over a pulley, that the outlet stayed \
+             in one place, and the sensor itself against a known length"
         }
         Sensor::Position | Sensor::Pose => {
-            "whether the tracker read in both faces, whether two targets or nests were read in turn, whether the rows come from sessions with \
-             different sensor frames, and the sensor itself against a known length"
+            "that the tracker read in one face, that one target in one nest was read, that the tracker stayed in one place, and the \
+             sensor itself against a known length"
         }
     }
 }
@@ -141,8 +143,8 @@ fn findings(diagnosis: &Diagnosis) -> Table {
         ],
     );
     table.notes.push(
-        "explains: the part of the readings that nothing else in the model explains, RMS over all rows. identified: better than its \
-         alternatives, and found again in halves of the rows."
+        "explains: the part of the readings that only this cause explains, RMS over all rows. identified: it explains them better \
+         than its alternatives, and is found again in halves of the rows."
             .to_owned(),
     );
     table
@@ -153,20 +155,19 @@ pub(super) fn in_short(finding: &Finding) -> String {
     let joints = finding.joints.as_deref();
     if !finding.members.is_empty() {
         let members: Vec<String> = finding.members.iter().map(member).collect();
-        return sentence(&format!("an error {}: {}", family(finding), members.join(", ")));
+        return capitalised(&format!("an error {}: {}", family(finding), members.join(", ")));
     }
     let names_a_part = finding.non_centrality.is_some();
     let several = joints.is_some_and(|joints| joints.len() > 1);
     if names_a_part && (finding.confidence == Confidence::Ambiguous || several) {
-        return sentence(&located(finding.effect, joints, finding.rows));
+        return capitalised(&located(finding.effect, joints, finding.rows));
     }
-    let mut terms = finding.cause.split("; ");
-    let first = sentence(terms.next().unwrap_or_default());
-    match terms.count() {
-        n if n > 0 && names_a_part => {
-            format!("{first}; with {n} further {}", if n == 1 { "term" } else { "terms" })
+    match finding.terms.as_slice() {
+        [first, further @ ..] if !further.is_empty() && names_a_part => {
+            let further = counted(further.len(), "further term", "further terms");
+            format!("{}; with {further}", capitalised(first))
         }
-        _ => sentence(&finding.cause),
+        _ => capitalised(&finding.cause),
     }
 }
 
@@ -188,5 +189,5 @@ fn actions(diagnosis: &Diagnosis) -> Vec<String> {
     let names_file = out.iter().any(|(action, _)| action.contains(DIAGNOSIS_FILE));
     let file =
         names_file.then(|| format!("{DIAGNOSIS_FILE} is what `diagnose --json {DIAGNOSIS_FILE}` writes"));
-    out.into_iter().map(|(action, numbers)| format!("{}: {action}", and(&numbers))).chain(file).collect()
+    out.into_iter().map(|(action, numbers)| format!("{}: {action}", listed(&numbers))).chain(file).collect()
 }

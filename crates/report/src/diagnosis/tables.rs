@@ -1,9 +1,9 @@
 //! Tables of a diagnosis.
 
 use super::words::{confidence, place, place_of};
-use crate::number::handy;
 use crate::table::{Cell, Column, Table};
-use truegrind_calibration::diagnosis::finding::{Diagnosis, Finding, FoundParameter, Session};
+use truegrind_arm::parameter::display_unit;
+use truegrind_calibration::diagnosis::finding::{Diagnosis, Finding, FoundParameter};
 
 /// Errors of the models on other measurements of the same arm.
 pub fn transfer_table(diagnosis: &Diagnosis) -> Table {
@@ -99,8 +99,8 @@ pub(super) fn members(finding: &Finding) -> Table {
         ],
     );
     table.notes.push(
-        "share: of the evidence, if exactly one of these is true. How often the largest share is right was not measured: it is no probability, and no \
-         reason to change a part before the deciding measurement."
+        "share: of the evidence, if exactly one of these is true. It is not a probability: do not replace a part before the deciding \
+         measurement."
             .to_owned(),
     );
     table
@@ -116,18 +116,11 @@ pub(super) fn sessions(finding: &Finding) -> Table {
                 format!("{} to {}", session.rows[0], session.rows[1]).into()
             }),
             (Column::text("what", "cause of a shift of these rows alone"), |session| {
-                shift_alone(session).into()
+                session.shift.as_ref().unwrap_or(&session.cause).as_str().into()
             }),
             (Column::number("worth_mm", "explains", "mm", 3), |session| session.worth_mm.into()),
         ],
     )
-}
-
-/// What shifted, without its rows and without what may have done it.
-fn shift_alone(session: &Session) -> &str {
-    let [from, to] = session.rows;
-    let text = session.cause.split(':').next().unwrap_or_default();
-    text.strip_prefix(&format!("in rows {from} to {to} ")).unwrap_or(text)
 }
 
 /// A p-value; an underflowing one is stated as a bound.
@@ -147,7 +140,7 @@ pub(super) fn parameters(finding: &Finding) -> Table {
     // The knots of a map are shown as a plot.
     let shown: Vec<&FoundParameter> = finding.parameters.iter().filter(|p| p.name != "knot").collect();
     for parameter in shown {
-        let (scale, unit) = handy(&parameter.unit);
+        let (scale, unit) = display_unit(&parameter.unit);
         table.push([
             Cell::from(parameter.name.as_str()),
             Cell::with_sigma(parameter.value * scale, parameter.sigma.map(|s| s * scale)),

@@ -3,6 +3,7 @@
 use crate::number::listed;
 use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, Family, Finding, Member};
+use truegrind_math::sentence;
 
 /// A cause with its joints or rows, for a sentence.
 pub(super) fn located(effect: CauseKind, joints: Option<&[usize]>, rows: Option<[usize; 2]>) -> String {
@@ -53,18 +54,6 @@ pub(super) fn confidence(finding: &Finding) -> &'static str {
     }
 }
 
-/// Numbers as in a sentence: "2, 5 and 6".
-pub(super) fn and(numbers: &[usize]) -> String {
-    match numbers {
-        [] => String::new(),
-        [one] => one.to_string(),
-        [first @ .., last] => {
-            let first: Vec<String> = first.iter().map(usize::to_string).collect();
-            format!("{} and {last}", first.join(", "))
-        }
-    }
-}
-
 pub(crate) fn place(finding: &Finding) -> String {
     if let Some(list) = &finding.row_list {
         return format!("rows {}", listed(list));
@@ -78,21 +67,16 @@ pub(super) fn place_of(effect: CauseKind, joints: Option<&[usize]>, rows: Option
     match (joints, rows) {
         (_, Some([from, to])) => format!("rows {from} to {to}"),
         (Some([one]), _) => format!("{part} {one}"),
-        (Some(several), _) if !several.is_empty() => format!("{part}s {}", and(several)),
+        (Some(several), _) if !several.is_empty() => format!("{part}s {}", sentence::listed(several)),
         _ => "all rows".to_owned(),
     }
-}
-
-pub(super) fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// The likeliest cause and its place.
 pub(super) fn title(finding: &Finding) -> String {
     let (effect, joints, rows) = finding.likeliest();
     let place = if finding.row_list.is_some() { place(finding) } else { place_of(effect, joints, rows) };
-    format!("{}, {place}", sentence(&effect.words()))
+    format!("{}, {place}", sentence::capitalised(&effect.words()))
 }
 
 /// The statistics of a finding.
@@ -134,7 +118,7 @@ pub(super) fn doubts(finding: &Finding) -> Vec<String> {
 pub(super) fn remaining(diagnosis: &Diagnosis) -> String {
     let rmse = diagnosis.fits.extended.rmse_mm;
     match (&diagnosis.remaining, diagnosis.noise_floor_mm) {
-        (Some(text), _) => format!("{}.", sentence(text)),
+        (Some(text), _) => format!("{}.", sentence::capitalised(text)),
         (None, Some(floor)) => format!(
             "Explained: {rmse:.3} mm RMS remains, and the noise floor is {floor:.3} mm ({}).",
             diagnosis.noise_floor_source

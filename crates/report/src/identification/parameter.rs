@@ -1,6 +1,7 @@
 //! Display of identified parameters.
 
 use truegrind_arm::estimated::EstimatedParameter;
+use truegrind_arm::parameter::display_unit;
 
 /// A parameter with all values multiplied by `factor`.
 pub(super) fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -> EstimatedParameter {
@@ -21,7 +22,7 @@ pub(super) fn handy(parameter: &EstimatedParameter) -> EstimatedParameter {
         "1" => (1e6, "ppm"),
         "1/K" => (1e6, "ppm/K"),
         "rad/(N m)" => (1e6, "µrad/(N m)"),
-        unit => crate::number::handy(unit),
+        unit => display_unit(unit),
     };
     in_unit(parameter, factor, unit)
 }

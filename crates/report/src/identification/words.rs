@@ -10,7 +10,8 @@ use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
 use truegrind_calibration::measurement::dataset::Dataset;
-use truegrind_calibration::measurement::split;
+use truegrind_calibration::measurement::noise_floor::noise_floor;
+use truegrind_math::sentence::listed;
 
 /// Remarks on the errors.
 pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> {
@@ -24,7 +25,7 @@ pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> 
         ));
     }
     if let Some(floor) = found.estimated.noise_floor_mm {
-        out.push(match (split::noise_floor(dataset).is_some(), held < 1.5 * floor) {
+        out.push(match (noise_floor(dataset).is_some(), held < 1.5 * floor) {
             (true, true) => format!(
                 "Repeated poses scatter by {floor:.3} mm, so a better model could hardly reduce the error on these rows."
             ),
@@ -101,10 +102,7 @@ fn combination(found: &Identification, terms: &[(Parameter, f64)]) -> String {
     match moves.as_slice() {
         [] => "a combination without dominant members is not identifiable".to_owned(),
         [one] => format!("{one} is not identifiable"),
-        [first, other] => format!("{first} together with {other} is not identifiable"),
-        [first, others @ .., last] => {
-            format!("{first} together with {} and {last} is not identifiable", others.join(", "))
-        }
+        [first, others @ ..] => format!("{first} together with {} is not identifiable", listed(others)),
     }
 }
 

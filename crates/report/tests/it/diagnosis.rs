@@ -3,8 +3,9 @@
 use std::sync::OnceLock;
 
 use truegrind_arm::robots;
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind_calibration::diagnosis::finding::Confidence;
+use truegrind_calibration::diagnosis::finding::{Confidence, NoiseFloorSource, Session};
 use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::import;
@@ -79,6 +80,53 @@ fn an_ambiguous_finding_is_titled_by_its_likeliest_member() {
     assert!(page.contains("1. Gear transmission, joint 1"), "{page}");
 }
 
+/// What is cut short is a list of parts, and not a sentence that happens to have a semicolon.
+#[test]
+fn a_finding_of_several_terms_is_titled_by_the_first() {
+    let (found, _) = diagnosed();
+    let mut found = found.clone();
+    let finding = &mut found.diagnosis.findings[0];
+    finding.cause = "joint 3 slips; it was seen twice".to_owned();
+    finding.terms.clear();
+    let one = on_a_terminal(&view::summary(&found)).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(one.contains("Joint 3 slips; it was seen twice"), "{one}");
+    found.diagnosis.findings[0].terms = vec!["joint 3 slips".to_owned(), "it was seen twice".to_owned()];
+    let several = on_a_terminal(&view::summary(&found)).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(several.contains("Joint 3 slips; with 1 further term"), "{several}");
+}
+
+/// The table of sessions has the rows in a column of their own.
+#[test]
+fn a_session_says_what_shifted() {
+    let (found, dataset) = diagnosed();
+    let mut found = found.clone();
+    found.diagnosis.findings[0].sessions = vec![Session {
+        rows: [80, 99],
+        effect: CauseKind::SensorZeroShift,
+        cause: "the cable's zero jumped by 1.200 mm in rows 80 to 99".to_owned(),
+        shift: Some("the cable's zero jumped by 1.200 mm".to_owned()),
+        worth_mm: 0.3,
+    }];
+    let page = on_a_terminal(&view::document(&found, dataset));
+    assert!(page.contains("the cable's zero jumped by 1.200 mm"), "{page}");
+    assert!(!page.contains("in rows 80 to 99"), "{page}");
+}
+
+/// The source of a noise floor is a sentence in files, and is read from it.
+#[test]
+fn a_source_of_the_noise_floor_survives_a_file() {
+    for source in [
+        NoiseFloorSource::Repeats { poses: 20, freedom: 40 },
+        NoiseFloorSource::RoundingAlone,
+        NoiseFloorSource::Unknown,
+    ] {
+        let text = serde_json::to_string(&source).unwrap();
+        assert_eq!(text, format!("\"{source}\""));
+        assert_eq!(serde_json::from_str::<NoiseFloorSource>(&text).unwrap(), source);
+    }
+    assert!(serde_json::from_str::<NoiseFloorSource>("\"a guess\"").is_err());
+}
+
 #[test]
 fn the_page_folds_statistics_and_opens_with_the_answer() {
     let (found, dataset) = diagnosed();
@@ -94,26 +142,26 @@ fn the_page_folds_statistics_and_opens_with_the_answer() {
 fn a_remainder_far_above_the_noise_floor_is_a_warning() {
     let (found, dataset) = diagnosed();
     let mut found = found.clone();
-    let mut summary = |error_mm: f64, floor_mm: f64, source: &str| {
+    let mut summary = |error_mm: f64, floor_mm: f64, source: NoiseFloorSource| {
         let diagnosis = &mut found.diagnosis;
         diagnosis.findings.clear();
         diagnosis.fits.geometric.cv_rmse_mm = error_mm;
         diagnosis.fits.extended.cv_rmse_mm = error_mm;
         diagnosis.fits.extended.rmse_mm = 0.95 * error_mm;
         diagnosis.noise_floor_mm = Some(floor_mm);
-        diagnosis.noise_floor_source = source.to_owned();
+        diagnosis.noise_floor_source = source;
         let text = on_a_terminal(&view::document(&found, dataset));
         (text.split_whitespace().collect::<Vec<_>>().join(" "), found.diagnosis.is_partly_unexplained())
     };
-    let rounding = "rounding alone; too few poses were repeated";
+    let rounding = NoiseFloorSource::RoundingAlone;
     let (text, flagged) = summary(1.045, 0.004, rounding);
     assert!(flagged && text.contains("[warning] No cause beyond geometry was found"), "{text}");
     assert!(text.contains("is 261 times the noise floor (0.004 mm, which is that of rounding"), "{text}");
-    assert!(text.contains("two targets or nests") && text.contains("several times"), "{text}");
+    assert!(text.contains("one target in one nest") && text.contains("several times"), "{text}");
     // Rounding says nothing of the sensor, whose usual noise explains this.
     let (text, flagged) = summary(0.03, 0.004, rounding);
     assert!(!flagged && text.contains("[ok] No cause beyond geometry was found"), "{text}");
-    let repeated = "20 repeated poses, 40 degrees of freedom";
+    let repeated = NoiseFloorSource::Repeats { poses: 20, freedom: 40 };
     let (text, flagged) = summary(0.1, 0.02, repeated);
     assert!(flagged && text.contains("is 5 times the noise floor (0.020 mm)"), "{text}");
     let (text, flagged) = summary(0.05, 0.02, repeated);
@@ -124,22 +172,23 @@ fn a_remainder_far_above_the_noise_floor_is_a_warning() {
 #[test]
 fn the_headline_says_what_the_noise_floor_is_of() {
     let mut found = diagnosed().0.clone();
-    let mut headline = |floor_mm: f64, source: &str| {
+    let mut headline = |floor_mm: f64, source: NoiseFloorSource| {
         found.diagnosis.noise_floor_mm = Some(floor_mm);
-        found.diagnosis.noise_floor_source = source.to_owned();
+        found.diagnosis.noise_floor_source = source;
         let text = on_a_terminal(&view::summary(&found));
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         text.split_once("explains [mm]").map_or(text.clone(), |(head, _)| head.to_owned())
     };
-    let rounding = "rounding alone; too few poses were repeated";
+    let rounding = NoiseFloorSource::RoundingAlone;
     let fine = headline(0.0002, rounding);
     assert!(fine.contains("the noise floor is unknown, since too few poses were repeated"), "{fine}");
     assert!(!fine.contains("0.000 mm"), "{fine}");
     let coarse = headline(0.012, rounding);
     assert!(
-        coarse.contains("the rounding of the log alone makes 0.012 mm, the noise of the sensor is unknown"),
+        coarse
+            .contains("rounding of the log alone accounts for 0.012 mm; the noise of the sensor is unknown"),
         "{coarse}"
     );
-    let measured = headline(0.012, "20 repeated poses, 40 degrees of freedom");
+    let measured = headline(0.012, NoiseFloorSource::Repeats { poses: 20, freedom: 40 });
     assert!(measured.contains("noise floor 0.012 mm"), "{measured}");
 }

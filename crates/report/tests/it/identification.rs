@@ -336,7 +336,7 @@ fn programs_after_is_a_range_where_the_noise_is_not_known() {
     let mut found = found.clone();
     let alone = Benefit { estimated_mm: 0.061, estimated_at_most_mm: 0.061, ..found.benefit.unwrap() };
     let mut text = |beyond: BeyondNoise| {
-        found.benefit = Some(alone.with(beyond));
+        found.benefit = Some(alone.with_unmodelled(beyond));
         let most_mm = view::json(&found, dataset)["benefit"]["estimated_at_most_mm"].as_f64().unwrap();
         let pages = [view::summary(&found), view::document(&found, dataset)];
         (pages.map(|page| terminal::document(&page, 100)), most_mm)

@@ -65,7 +65,7 @@ impl CalibrationProblem {
     /// Where no parameter is free.
     pub fn linearise(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
         let state = State::of(self, x);
-        let (p, n, per) = (self.parameters.len(), self.rows(), self.components());
+        let (p, n, per) = (self.parameters.len(), self.rows(), self.sensor.scalars());
         assert!(p > 0, "a problem without parameters has no Jacobian");
         let chunk = COST_LANES * WIDTH;
         let (mut residuals, mut transposed) = (DVector::zeros(n), DMatrix::zeros(p, n));
@@ -109,21 +109,21 @@ impl Problem for CalibrationProblem {
     }
 
     fn rows(&self) -> usize {
-        self.rows * self.components()
+        self.rows * self.sensor.scalars()
     }
 
     fn rows_per_observation(&self) -> usize {
-        self.components()
+        self.sensor.scalars()
     }
 
     fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]) {
-        let c = self.components();
+        let c = self.sensor.scalars();
         let state = State::of(self, x);
         self.scatter(&state, rows.start / c..rows.end / c, Some(out), None);
     }
 
     fn jacobian(&self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
-        let c = self.components();
+        let c = self.sensor.scalars();
         let state = State::of(self, x);
         self.scatter(&state, rows.start / c..rows.end / c, Some(residuals), Some(jacobian));
     }
@@ -147,7 +147,7 @@ impl Problem for CalibrationProblem {
 
     fn row_cost(&self, x: &[f64]) -> f64 {
         let state = State::of(self, x);
-        let c = self.components();
+        let c = self.sensor.scalars();
         let parts: Vec<f64> = self
             .blocks_of(if self.parameters.len() > FEW { COST_LANES } else { BLOCK_LANES })
             .into_par_iter()
@@ -191,7 +191,7 @@ impl CalibrationProblem {
         add: impl Fn(&[f64], usize, &mut [f64]) + Sync,
     ) -> DMatrix<f64> {
         let state = State::of(self, x);
-        let (p, c) = (self.parameters.len(), self.components());
+        let (p, c) = (self.parameters.len(), self.sensor.scalars());
         let most = block_lanes(p, c);
         let blocks = self.blocks_of(most);
         // With many parameters a square matrix per block would cost more than its products, so several blocks share one.
@@ -230,7 +230,7 @@ impl CalibrationProblem {
         residuals: Option<&mut [f64]>,
         jacobian: Option<&mut [f64]>,
     ) {
-        let (p, c) = (self.parameters.len(), self.components());
+        let (p, c) = (self.parameters.len(), self.sensor.scalars());
         let (first, last) = (observations.start / WIDTH, observations.end.div_ceil(WIDTH));
         let total = observations.len() * c;
         let axes = jacobian.is_some().then_some(Axes::Base);

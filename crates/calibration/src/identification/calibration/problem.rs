@@ -149,12 +149,4 @@ impl CalibrationProblem {
         frames.flange_from_target = apply_twist(&frames.flange_from_target, &tool);
         (model, frames)
     }
-
-    pub(super) fn components(&self) -> usize {
-        match self.sensor {
-            Sensor::Cable => 1,
-            Sensor::Position => 3,
-            Sensor::Pose => 6,
-        }
-    }
 }

@@ -116,7 +116,7 @@ fn check_outlets(reader: &Reader<'_>, rows: &[Row]) -> Result<(), ImportError> {
 
 /// The step to which readings are rounded (mm).
 fn reading_step(rows: &[Row], sensor: Sensor) -> Option<f64> {
-    let count = if sensor == Sensor::Cable { 1 } else { 3 };
+    let count = sensor.axes();
     rounding::step_of_readings(rows.iter().flat_map(|r| {
         let at: [f64; 3] = r.reading.place_mm().into();
         at.into_iter().take(count)

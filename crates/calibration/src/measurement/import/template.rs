@@ -19,12 +19,12 @@ const QUATERNION: &str = "orientation of the target in the sensor's frame, a uni
 const TIME: &str = "hours since the start (may be empty)";
 const TEMPERATURE: &str = "temperature of the arm (°C, may be empty)";
 const PAYLOAD: &str = "load on the flange (kg, may be empty)";
-const SESSION: &str = "any name; another one where sensor or target may have moved in place: whether they did is then checked; measured from elsewhere, rows \
-                       belong in a file of their own (may be empty)";
+const SESSION: &str = "any name; a new one where sensor or target may have shifted, which is then checked; rows that were measured \
+                       from another place belong in another file (may be empty)";
 const OUTLET: &str =
     "number of the cable's outlet, from 1 (may be empty in all rows where there is only one)";
 const READOUT: &str =
-    "position as the controller shows it (mm, may be empty); it sharpens rounded joint angles";
+    "position as the controller shows it (mm, may be empty); it refines rounded joint angles";
 const APPROACH: &str =
     "side from which each joint arrived, −1 or +1 (may be empty); it tells backlash from other errors";
 const PATH: &str = "for rows read while the arm runs a path, which `accept` judges: any name, which run (from 1), which sampling point \

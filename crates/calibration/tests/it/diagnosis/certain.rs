@@ -376,14 +376,10 @@ fn play_that_its_load_closes_is_told_and_not_written() {
     let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 81)).dataset);
     let play = found.diagnosis.findings.iter().find(|f| f.effect == "backlash").unwrap();
     assert_eq!((play.joints.as_deref(), play.confidence), (Some(&[3][..]), Confidence::Identified));
-    assert!(play.cause.contains("gravity decides which flank bears"), "{}", play.cause);
+    assert!(play.cause.contains("of backlash that gravity closes"), "{}", play.cause);
     let size = &play.parameters[0];
     assert!((size.value - 0.0015).abs() < 4e-4, "{size:?}");
-    assert!(
-        play.remedy.contains("gear mesh") && play.remedy.contains("does not include it"),
-        "{}",
-        play.remedy
-    );
+    assert!(play.remedy.contains("gear mesh") && play.remedy.contains("leaves it out"), "{}", play.remedy);
     let backlash = |effect: &Effect| matches!(effect, Effect::Backlash(_));
     assert!(!found.estimated.model.effects.iter().any(backlash));
 }
@@ -515,7 +511,13 @@ fn what_the_written_arm_lacks_of_the_arm_is_in_its_error_beside_a_droop() {
         let hidden =
             [Hidden::LoadedPlay { joint: 1, play_rad: 8e-4, closed_nm: 4.0 }, Hidden::Droop { mm: 0.06 }];
         let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 240, seed)).dataset);
-        left_out += usize::from(found.diagnosis.notes.iter().any(|note| note.contains("out of its fit")));
+        left_out += usize::from(
+            found
+                .diagnosis
+                .notes
+                .iter()
+                .any(|note| note.contains("fitted without the causes in the measurement")),
+        );
         let unwritten = identified(&found).into_iter().find(|f| f.joints.as_deref() == Some(&[2][..]));
         let Some(worth_mm) = unwritten.and_then(|finding| finding.worth_mm) else { continue };
         let stated_mm = found.benefit.unwrap().estimated_mm;

@@ -33,7 +33,7 @@ fn a_raster_with_play_has_no_name_but_play() {
             .map(|f| f.cause.as_str())
             .collect();
         assert!(wrong.is_empty(), "seed {seed}: {wrong:?}");
-        let told = |reason: &String| reason.contains("the place of the target on the flange is not seen");
+        let told = |reason: &String| reason.contains("do not show where the target sits on the flange");
         assert!(found.estimated.verdict.reasons.iter().any(told), "seed {seed}");
     }
 }

@@ -147,7 +147,7 @@ fn single_angles_of_a_grid_are_named() {
     });
     let grid = diagnosed(&Dataset::new("grid.csv", Sensor::Position, rows.collect::<Vec<Row>>()));
     let told = |found: &Diagnosed| -> Option<String> {
-        found.diagnosis.notes.iter().find(|note| note.contains("single angles")).cloned()
+        found.diagnosis.notes.iter().find(|note| note.contains("at a few angles only")).cloned()
     };
     let note = told(&grid).expect("a note");
     assert!(note.contains("(joint 1 at 3, joint 2 at 3, joint 3 at 3, joint 4 at 3)"), "{note}");

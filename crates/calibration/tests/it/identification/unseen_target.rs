@@ -107,7 +107,7 @@ fn identified(dataset: &Dataset, frames: &Frames, target_mm: f64) -> Identificat
 }
 
 fn told(found: &Identification) -> Option<&String> {
-    found.estimated.verdict.reasons.iter().find(|reason| reason.contains("the place of the target"))
+    found.estimated.verdict.reasons.iter().find(|reason| reason.contains("where the target sits"))
 }
 
 #[test]

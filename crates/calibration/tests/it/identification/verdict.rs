@@ -2,12 +2,16 @@
 //! taken for a good model, whatever else makes readings agree with themselves (a scale, noise that was followed, links where
 //! no arm has them).
 
-use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
+use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, StageErrors};
 use truegrind_calibration::diagnosis;
+use truegrind_calibration::identification::benefit::{NoBenefit, benefit};
+use truegrind_calibration::identification::identify::prepare_observations;
+use truegrind_calibration::identification::inflation::{inflation_from_errors, inflation_from_rows};
 use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
-use truegrind_calibration::identification::verdict::VerdictBuilder;
+use truegrind_calibration::identification::verdict::{Limits, VerdictBuilder};
 use truegrind_calibration::measurement::import;
+use truegrind_math::statistics::ErrorSummary;
 
 use super::promise::{Case, Outcome};
 
@@ -77,6 +81,51 @@ fn implausible_links_are_one_reason() {
         assert_eq!(verdict.status, Judgement::Fail);
         assert_eq!(verdict.reasons, [format!("{expected}: {causes}")]);
     }
+}
+
+/// An error that nobody measured is no good error: a held-out set without rows, an error that is not a number.
+#[test]
+fn an_unknown_held_out_error_does_not_pass() {
+    let unknown = ErrorSummary::of([]);
+    for (before, after) in [(1.0, f64::NAN), (f64::NAN, 0.1), (unknown.rmse, unknown.rmse)] {
+        let mut verdict = VerdictBuilder::default();
+        verdict.check_held_out(before, after);
+        let verdict = verdict.build();
+        assert_eq!(verdict.status, Judgement::Fail, "{before} {after}");
+        assert!(verdict.reasons[0].contains("unknown"), "{:?}", verdict.reasons);
+    }
+    let mut verdict = VerdictBuilder::default();
+    let limits = Limits { rmse_mm: Some(1.0), max_mm: Some(1.0) };
+    verdict.check_limits(&limits, &unknown);
+    assert_eq!(verdict.build().status, Judgement::Fail);
+}
+
+/// Whether the fit understates its uncertainty is known from held-out errors alone: without them no benefit is promised.
+#[test]
+fn a_benefit_without_a_held_out_error_is_doubted() {
+    let found = tracker(40, 0.03, 0.0).outcome().found.unwrap();
+    let dataset = import::read(
+        "case.csv",
+        tracker(40, 0.03, 0.0).measured().csv.as_bytes(),
+        &import::Options::default(),
+    )
+    .unwrap();
+    let errors = |fitted: &[f64], held_out: &[f64]| StageErrors {
+        fitted: ErrorSummary::of(fitted.iter().copied()),
+        held_out: ErrorSummary::of(held_out.iter().copied()),
+    };
+    let inflation = |errors: &StageErrors| inflation_from_errors(&found.geometry, &dataset, errors);
+    assert_eq!(inflation(&errors(&[0.1], &[0.1])), Some(1.0));
+    for unknown in [errors(&[0.0], &[0.0]), errors(&[0.0], &[0.1]), errors(&[0.1], &[])] {
+        assert_eq!(inflation(&unknown), None, "{unknown:?}");
+    }
+    let (observed, _) = prepare_observations(&dataset, &found.estimated.nominal, true);
+    assert_eq!(inflation_from_rows(&found.training, &observed.subset(&[])), None);
+    let unknown = benefit(&found.geometry, &dataset, &found.estimated, &Tolerance::default(), None);
+    assert_eq!(unknown.as_ref().err(), Some(&NoBenefit::UnknownInflation));
+    let mut verdict = VerdictBuilder::default();
+    verdict.check_benefit(unknown.as_ref(), dataset.sensor);
+    assert_eq!(verdict.build().status, Judgement::Doubtful);
 }
 
 /// The class: a model of few noisy rows follows the noise, and three held-out rows cannot tell.

@@ -2,6 +2,8 @@
 
 use truegrind_arm::model::Joints;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::noise_floor::noise_floor;
+use truegrind_calibration::measurement::repeated_poses::poses;
 use truegrind_calibration::measurement::split::{self, Split};
 
 use super::simulation::{CABLE, measure, random};
@@ -133,11 +135,11 @@ fn blocks_leave_repetitions_of_their_poses_out_of_the_fit() {
 
 #[test]
 fn noise_floor_is_the_sensors() {
-    let floor = split::noise_floor(&repeated()).unwrap();
+    let floor = noise_floor(&repeated()).unwrap();
     assert_eq!((floor.poses, floor.freedom), (100, 100));
     // σ/√(2 ν) = 0.02.
     assert!((floor.sigma_mm - 0.3).abs() < 0.07, "{floor:?}");
-    assert_eq!(split::noise_floor(&measure(&random(50, CABLE)).1), None);
+    assert_eq!(noise_floor(&measure(&random(50, CABLE)).1), None);
 }
 
 #[test]
@@ -148,10 +150,10 @@ fn nearly_equal_poses_are_one_unless_the_read_out_differs() {
     };
     let mut data =
         Dataset::new("made", Sensor::Cable, vec![row(0, 10.0), row(1, 40.0), row(2, 10.002), row(3, 10.02)]);
-    assert_eq!(split::poses(&data), [vec![0, 2], vec![1], vec![3]]);
+    assert_eq!(poses(&data), [vec![0, 2], vec![1], vec![3]]);
     data.rows[0].extra_mut().readout_mm = Some(nalgebra::Vector3::new(1.0, 2.0, 3.0));
     data.rows[2].extra_mut().readout_mm = Some(nalgebra::Vector3::new(1.0, 2.3, 3.0));
-    assert_eq!(split::poses(&data).len(), 4);
+    assert_eq!(poses(&data).len(), 4);
 }
 
 /// The class: a number of rows decides how often they are compared with each other. Rows that are one to the last bit are not
@@ -198,7 +200,7 @@ fn poses_are_those_that_comparing_every_pair_gives() {
         .map(|first| (0..group.len()).filter(|i| group[*i] == first).collect())
         .collect();
     assert!(data.angle_step_rad.is_some());
-    assert_eq!(split::poses(&data), expected);
+    assert_eq!(poses(&data), expected);
 }
 
 /// Parts share the rows of the whole until one of them is changed.
@@ -220,17 +222,17 @@ fn a_part_shares_its_rows_until_it_is_changed() {
 #[test]
 fn copied_rows_are_no_noise_floor() {
     let data = repeated();
-    let floor = split::noise_floor(&data).unwrap();
+    let floor = noise_floor(&data).unwrap();
     let with = |more: &dyn Fn(&Row) -> Option<Row>| {
         let mut rows: Vec<Row> = data.rows.iter().cloned().collect();
         rows.extend(data.rows.iter().filter_map(more));
         Dataset { rows: rows.into(), ..data.clone() }
     };
-    assert_eq!(split::noise_floor(&with(&|row| Some(row.clone()))), Some(floor));
+    assert_eq!(noise_floor(&with(&|row| Some(row.clone()))), Some(floor));
     // Once each, and each copied: no pose was read again.
     let first = data.subset(&(0..100).collect::<Vec<_>>());
     let twice: Vec<Row> = first.rows.iter().chain(first.rows.iter()).cloned().collect();
-    assert_eq!(split::noise_floor(&Dataset { rows: twice.into(), ..first }), None);
+    assert_eq!(noise_floor(&Dataset { rows: twice.into(), ..first }), None);
     // A cable that reads half millimetres reads the same one again and again.
     let coarse = |row: &Row| match row.reading {
         Reading::Cable(length) => {
@@ -239,7 +241,7 @@ fn copied_rows_are_no_noise_floor() {
         _ => row.clone(),
     };
     let rough: Vec<Row> = data.rows.iter().map(coarse).collect();
-    let rough = split::noise_floor(&Dataset { rows: rough.into(), ..data.clone() }).unwrap();
+    let rough = noise_floor(&Dataset { rows: rough.into(), ..data.clone() }).unwrap();
     assert_eq!(rough.freedom, floor.freedom);
 }
 

@@ -44,9 +44,9 @@ fn an_arm_that_stays_has_not_departed_and_one_that_drifts_slowly_has() {
     assert!(now.is_significant, "{now:?}");
     let whole_mm = distance_mm(&tracker.model(), model());
     assert!(now.rms_mm > 0.4 * whole_mm && now.rms_mm <= whole_mm, "{now:?}, {whole_mm} mm");
-    let (name, unit, moved, sigma) = &now.parameters[0];
-    assert_eq!((name.as_str(), unit.as_str()), ("link3.theta", "rad"), "{now:?}");
-    assert!((moved.to_degrees() - 0.001 * 239.0).abs() < 0.02 && *sigma > 0.0, "{now:?}");
+    let moved = &now.parameters[0];
+    assert_eq!((moved.name.as_str(), moved.unit.as_str()), ("link3.theta", "rad"), "{now:?}");
+    assert!((moved.by.to_degrees() - 0.001 * 239.0).abs() < 0.02 && moved.sigma > 0.0, "{now:?}");
     // It is known after a stop, and without new poses.
     let text = tracker.state().to_toml().unwrap();
     let resumed = Tracker::resume(model(), State::from_toml(&text).unwrap(), "state.toml").unwrap();
@@ -79,7 +79,7 @@ fn gross_errors_among_the_first_poses_hide_no_later_change() {
         let Reading::Position(p) = &mut dataset.rows[4].reading else { panic!("a position") };
         p.x += off_mm;
         let (tracker, alarms) = tracked(&dataset);
-        assert!((1..=3).contains(&tracker.state().accidents), "{off_mm}: {}", tracker.state().accidents);
+        assert!((1..=3).contains(&tracker.state().outliers), "{off_mm}: {}", tracker.state().outliers);
         let jump = alarms.iter().find(|alarm| alarm.course != Course::Drift).expect("the jump is found");
         assert!(jump.since_row.abs_diff(72) <= 2, "{off_mm}: {jump}");
         assert!((jump.shift.to_degrees() - 0.05).abs() < 0.01, "{off_mm}: {jump}");
@@ -152,7 +152,7 @@ fn a_sensor_set_up_anew_hides_no_change_of_the_arm_at_the_same_time() {
         let truth = if is_changed { 0.05 } else { 0.0 };
         assert!((moved - truth).abs() < 0.005, "{moved}: {alarms:?}");
         assert_eq!(tracker.departure().unwrap().is_significant, is_changed, "{alarms:?}");
-        assert!(!tracker.mostly_set_aside(), "{}", tracker.state().accidents);
+        assert!(!tracker.mostly_set_aside(), "{}", tracker.state().outliers);
     }
 }
 
@@ -179,7 +179,7 @@ fn an_uncertain_first_model_hides_no_change_since_the_first_poses() {
     };
     for seed in 2..6 {
         let calm = departure(&measured(seed, None));
-        assert!(!calm.is_significant && calm.told.is_none(), "{seed}: {calm:?}");
+        assert!(!calm.is_significant && calm.reported.is_none(), "{seed}: {calm:?}");
     }
     let moved = departure(&with_jump(70, zero_of_joint_3()));
     let [since_mm, _] = moved.since_first_poses_mm.unwrap();
@@ -350,5 +350,5 @@ fn alarms_show_the_digits_that_tell_something() {
         sigma: 4.0,
     };
     let whole = Alarm { shift: 2.83, sigma: 4.46, unit: "mm".to_owned(), parts: vec![part], ..alarm };
-    assert!(whole.to_string().contains("by how much the poses do not tell yet"), "{whole}");
+    assert!(whole.to_string().contains("by an amount that the poses do not show yet"), "{whole}");
 }

@@ -6,10 +6,11 @@ use crate::protocol::{Outcome, Study};
 use crate::verdict::Conclusion;
 use crate::views::study::{ended, held_out, iterations, passes, registered, seconds, title, treatment};
 use crate::views::{named_causes, words};
+use truegrind_arm::parameter::display_unit;
 use truegrind_calibration::measurement::dataset::Sensor;
 use truegrind_math::statistics::median;
 use truegrind_report::document::Verdict;
-use truegrind_report::number::{Precision, handy};
+use truegrind_report::number::Precision;
 use truegrind_report::repeated::{self, spread};
 use truegrind_report::status::Status;
 use truegrind_report::table::{Cell, Column, Table};
@@ -236,7 +237,7 @@ pub(crate) fn times(study: &Study) -> Table {
 }
 
 pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
-    let rows = parameters.rows.iter().map(|row| (row, handy(row.parameter.unit())));
+    let rows = parameters.rows.iter().map(|row| (row, display_unit(row.parameter.unit())));
     let mut table = Table::of(
         format!("Link parameters by {} {}", parameters.id, parameters.name),
         &rows.collect::<Vec<_>>(),

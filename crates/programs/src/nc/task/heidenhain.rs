@@ -6,6 +6,7 @@ use super::super::modal_group::ModalGroup;
 use super::super::modal_state::MotionMode;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
+use super::block::Flags;
 use super::control_flow::label;
 use super::{Block, FlowPoint, Interpreter, StartDependency};
 use crate::motion::Reason;
@@ -104,7 +105,8 @@ impl<'s> Interpreter<'_, 's> {
         let number = |word: &&[u8]| std::str::from_utf8(word.strip_prefix(b"M")?).ok()?.parse().ok();
         let m: Vec<u32> = words.iter().filter_map(number).collect();
         if !m.is_empty() {
-            self.only_m_words(&Block { node: block.node, m, skippable: block.skippable, ..Block::default() });
+            let flags = Flags { skippable: block.flags.skippable, ..Flags::default() };
+            self.only_m_words(&Block { node: block.node, m, flags, ..Block::default() });
         }
     }
 

@@ -1,0 +1,386 @@
+//! The arm that a diagnosis hands over to compensation: which causes it has, what it lacks, its expected benefit and its verdict.
+
+use super::cause::Cause;
+use super::discrepancy::Discrepancy;
+use super::extension::Extended;
+use super::in_doubt::{self, MissingError};
+use super::joint_scatter::JointScatter;
+use super::link_geometry::LINK_Z;
+use super::options::Options;
+use super::search::{Search, SearchContext};
+use super::selection::contains_cause;
+use super::sensor_causes::{self, probability_worse};
+use super::validation::StageError;
+use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
+use crate::identification::benefit::{Benefit, NoBenefit, benefit};
+use crate::identification::beyond_noise::BeyondNoise;
+use crate::identification::fit::Fitted;
+use crate::identification::identify::{
+    self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition,
+    parameter_table, with_sigma_in_region,
+};
+use crate::identification::inflation::inflation_from_errors;
+use crate::identification::linearised_readings::widen_by_scale;
+use crate::identification::unseen_target::unseen_target;
+use crate::identification::verdict::{CONVERGED, VerdictBuilder};
+use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::split;
+use nalgebra::DMatrix;
+use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
+use truegrind_arm::region::Region;
+use truegrind_estimation::estimate::Estimate;
+use truegrind_estimation::problem::Problem;
+
+/// What is needed to hand over an arm.
+pub(super) struct Handover<'a> {
+    pub(super) search: &'a Search<'a>,
+    /// Name of the robot.
+    pub(super) robot: &'a str,
+    /// That of all rows, if all were searched.
+    pub(super) discrepancy: Option<&'a Discrepancy>,
+    /// A scatter about a joint.
+    pub(super) scatter: Option<JointScatter>,
+    /// The noise floor of sensor and rounding (mm).
+    pub(super) noise_floor_mm: Option<f64>,
+    /// What all causes leave beyond the scatter of repeated poses.
+    pub(super) beyond_noise: BeyondNoise,
+    /// Says that there are too few poses.
+    pub(super) few_poses: Option<String>,
+}
+
+/// The arm for compensation.
+pub(super) struct HandedOver {
+    pub(super) estimated: Estimated,
+    /// Absent where it cannot be stated.
+    pub(super) benefit: Option<Benefit>,
+}
+
+/// A fit under the tolerances of arms, with its errors.
+struct WrittenFit {
+    fit: Extended,
+    errors: StageError,
+}
+
+/// What an arm for compensation is made of.
+struct WrittenArm<'a> {
+    /// The fit that is written.
+    fitted: &'a Extended,
+    /// The same with uncertain causes of size 0, whose uncertainty it is written with.
+    with_uncertain: &'a Extended,
+    /// Errors of the written fit.
+    errors: StageError,
+    /// Errors of the fit with the certain causes of the measurement: what it lacks beyond the errors with all causes is the arm's, and
+    /// what a fit without the causes of the measurement lacks beyond that is not.
+    beside_sensor: StageError,
+}
+
+impl Handover<'_> {
+    /// The arm with the causes that are `certain`, or with fewer of them, as the notes say.
+    pub(super) fn arm(&self, certain: &[bool], notes: &mut Vec<String>) -> HandedOver {
+        let (search, discrepancy) = (self.search, self.discrepancy);
+        let certain = certain_model(search, certain, discrepancy);
+        let beside_sensor = certain.errors;
+        let (WrittenFit { fit, errors }, probability) =
+            without_measurement_causes(search, certain, discrepancy);
+        let fit = if fit.causes.is_empty() { self.as_identified(&fit).unwrap_or(fit) } else { fit };
+        notes.extend(probability.map(|probability| {
+            format!(
+                "the written arm was fitted without the causes in the measurement, which might make its links worse (probability \
+                 {:.0} %, at most {:.0} % are allowed)",
+                100.0 * probability,
+                100.0 * sensor_causes::MOST_PROBABILITY
+            )
+        }));
+        let with_uncertain = with_uncertain_causes(search, &fit, discrepancy);
+        let with_causes = self.estimated(&WrittenArm {
+            with_uncertain: with_uncertain.as_ref().unwrap_or(&fit),
+            fitted: &fit,
+            errors,
+            beside_sensor,
+        });
+        self.or_geometry_alone(with_causes, beside_sensor, notes)
+    }
+
+    /// The written arm with its benefit, or geometry alone (with a note) if only that is not refused.
+    ///
+    /// A cause whose law is only nearly right can drive links that the rows determine through it alone: where links warm up unequally,
+    /// a common growth is met by a link of another length whose constant part the frames take up.
+    fn or_geometry_alone(
+        &self,
+        with_causes: HandedOver,
+        beside_sensor: StageError,
+        notes: &mut Vec<String>,
+    ) -> HandedOver {
+        let verdict = &with_causes.estimated.verdict;
+        if verdict.status != Judgement::Fail || self.search.extended.causes.is_empty() {
+            return with_causes;
+        }
+        let Some(plain) = self.as_identified(&written(self.search, &[], None)) else { return with_causes };
+        // An arm that is refused as implausible does not say how far this one may be off.
+        let alone = self.estimated(&WrittenArm {
+            fitted: &plain,
+            with_uncertain: &plain,
+            errors: self.search.validation.stage(&plain),
+            beside_sensor,
+        });
+        if !matches!(alone.estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated) {
+            return with_causes;
+        }
+        notes.push(format!(
+            "the written arm is geometry alone, as `identify` fits it, since the arm with causes was refused: {}",
+            verdict.reasons.first().map_or("it is implausible", String::as_str)
+        ));
+        alone
+    }
+
+    /// A written arm without causes, with the estimate of `identify`: what names nothing should not write another geometry. `None` where
+    /// that fit has other parameters or failed.
+    fn as_identified(&self, written: &Extended) -> Option<Extended> {
+        let Fitted { parameters, priors, estimate, model, frames, problem, .. } =
+            identified(self.search.context, self.robot)?.geometry;
+        let place = |p| parameters.iter().position(|q| q == p);
+        let places = written.parameters.iter().map(place).collect::<Option<Vec<usize>>>()?;
+        // Rows that it rejects are few: those left count as consecutive.
+        let numbers: Vec<usize> = (0..problem.rows() / problem.rows_per_observation()).collect();
+        let own = estimate.covariance.as_ref()?;
+        let own = under_correlated_noise(&problem, &estimate.x, own, self.discrepancy, &numbers);
+        let covariance = DMatrix::from_fn(places.len(), places.len(), |a, b| own[(places[a], places[b])]);
+        let x: Vec<f64> = places.iter().map(|&k| estimate.x[k]).collect();
+        let priors = places.iter().map(|&k| priors[k]).collect();
+        let estimate = Estimate { x: x.clone(), covariance: Some(covariance), ..estimate };
+        Some(Extended { priors, x, model, frames, estimate, ..written.clone() })
+    }
+
+    /// The arm for compensation and its expected benefit. What it lacks stands in its covariance. Of too few poses no benefit is stated:
+    /// it would be the priors'.
+    fn estimated(&self, arm: &WrittenArm<'_>) -> HandedOver {
+        let SearchContext { subject, options, .. } = self.search.context;
+        let (nominal, rows) = (subject.nominal, &subject.observed.dataset);
+        let [fitted, handed] = &[arm.fitted, arm.with_uncertain].map(|fit| self.widened(fit));
+        let beyond_noise = self.beyond_noise_of(arm);
+        let mut estimated = self.without_verdict(fitted, handed, arm.errors, beyond_noise);
+        in_doubt::add_missing_errors(&mut estimated, self.missing_errors(arm));
+        let mut estimated = with_sigma_in_region(estimated, handed);
+        let benefit = match &self.few_poses {
+            Some(few) => Err(NoBenefit::FewPoses(few.clone())),
+            None => {
+                // A scatter about a joint remains with and without correction, as what all causes leave beyond the noise does.
+                let scatter_mm = self.scatter.as_ref().map_or(0.0, JointScatter::rms_mm);
+                let inflation = inflation_from_errors(fitted, rows, &estimated.geometry);
+                // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
+                benefit(fitted, rows, &estimated, &options.arm_tolerance, inflation)
+                    .map(|benefit| benefit.with_unmodelled(beyond_noise.at_least_scatter(scatter_mm)))
+            }
+        };
+        estimated.verdict = judge(&Judged {
+            fitted,
+            parameters: &parameter_table(fitted, nominal),
+            benefit: benefit.as_ref(),
+            sensor: rows.sensor,
+            unseen_target: unseen_target(handed, rows, &estimated),
+            stages: self.stages(arm.errors),
+            options,
+        });
+        HandedOver { estimated, benefit: benefit.ok() }
+    }
+
+    /// A fit with the stated uncertainty of the sensor's scale.
+    fn widened(&self, fit: &Extended) -> Fitted {
+        let SearchContext { subject, options, .. } = self.search.context;
+        let mut fitted = Fitted::from(fit);
+        if let Some(sigma) = options.arm_tolerance.scale {
+            widen_by_scale(&mut fitted, &subject.observed.dataset, sigma);
+        }
+        fitted
+    }
+
+    /// Errors of the causes that an arm cannot have.
+    fn missing_errors(&self, arm: &WrittenArm<'_>) -> Vec<MissingError> {
+        let search = self.search;
+        let mut missing =
+            in_doubt::missing_errors(&search.context.subject, &search.extended, arm.with_uncertain);
+        // What a fault of the joint without a file leaves is known better than its scatter.
+        let scatter = self.scatter.as_ref().map(MissingError::scatter);
+        missing
+            .extend(scatter.filter(|scatter| !missing.iter().any(|other| other.joint() == scatter.joint())));
+        missing
+    }
+
+    /// What an arm leaves beyond the noise.
+    fn beyond_noise_of(&self, arm: &WrittenArm<'_>) -> BeyondNoise {
+        let [all, beside_sensor, own] = [&self.search.stages[2], &arm.beside_sensor, &arm.errors]
+            .map(|s| StageErrors { fitted: s.fitted, held_out: s.random });
+        let sensor = self.search.context.dataset.sensor;
+        let of_arm = self.beyond_noise.of_submodel(&all, &beside_sensor, sensor, true);
+        of_arm.of_submodel(&beside_sensor, &own, sensor, false)
+    }
+
+    /// Errors of the data sheet, of geometry, and of the written fit.
+    fn stages(&self, own: StageError) -> [StageError; 3] {
+        let [before, geometry, _] = self.search.stages;
+        [before, geometry, own]
+    }
+
+    fn without_verdict(
+        &self,
+        fitted: &Fitted,
+        handed: &Fitted,
+        errors: StageError,
+        beyond_noise: BeyondNoise,
+    ) -> Estimated {
+        let SearchContext { dataset, prepared, subject, options, .. } = self.search.context;
+        let set_aside = &self.search.set_aside;
+        let stages = self.stages(errors);
+        Estimated {
+            robot: self.robot.to_owned(),
+            nominal: subject.nominal.clone(),
+            model: handed.model.clone(),
+            covariance: arm_covariance(handed),
+            width_uncertainty: learned_width_uncertainty(&options.arm_tolerance, fitted),
+            order: arm_parameters_of(handed),
+            provenance: Provenance {
+                file: dataset.file.clone(),
+                sha256: dataset.sha256.clone(),
+                rows: dataset.rows.len() - set_aside.len(),
+                set_aside: set_aside.iter().map(|&i| dataset.rows[i].number).collect(),
+                sensor: dataset.sensor,
+                method: "diagnose".to_owned(),
+                seed: options.selection.seed,
+                held_out: 0.2,
+                sharpened: prepared.readout_fusion.is_ok(),
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+            },
+            parameters: parameter_table(handed, subject.nominal)
+                .into_iter()
+                .filter(|p| p.is_of_arm())
+                .collect(),
+            registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
+            geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
+            noise_floor_mm: self.noise_floor_mm,
+            beyond_noise_mm: beyond_noise.known_mm(),
+            verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
+            region: Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0),
+            condition: mean_condition(dataset),
+        }
+    }
+}
+
+/// The same rows identified, with the options of the diagnosis.
+fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification> {
+    let SearchContext { dataset, subject, options, .. } = context;
+    let defaults = identify::Options::default();
+    let alone = identify::Options {
+        tolerance: options.arm_tolerance,
+        seed: options.selection.seed,
+        fuse_readout: options.fuse_readout,
+        limit_rmse_mm: options.limits.rmse_mm,
+        limit_max_mm: options.limits.max_mm,
+        ..defaults
+    };
+    let share = |rows: &Dataset| split::random(rows, alone.held_out, alone.seed);
+    identify::identify(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
+}
+
+/// The model with `causes` under the tolerances of the arm.
+fn written(search: &Search<'_>, causes: &[Cause], discrepancy: Option<&Discrepancy>) -> Extended {
+    let SearchContext { subject, options, .. } = &search.context;
+    fit_written(subject, &options.arm_tolerance, &search.extended, causes, discrepancy)
+}
+
+/// The arm for compensation, with its errors. Its effects are included only if they lower the held-out error of this very model, in
+/// random folds and in blocks; causes that are not part of it do not count.
+fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Discrepancy>) -> WrittenFit {
+    let of = |certain: &[bool]| {
+        let fit = written(search, &certain_causes(&search.extended, certain), discrepancy);
+        WrittenFit { errors: search.validation.stage(&fit), fit }
+    };
+    let found = of(certain);
+    let of_the_arm = |cause: &Cause| matches!(cause, Cause::Arm(_));
+    let is_carried = |cause: &Cause| of_the_arm(cause) || cause.stand_in().is_some();
+    let better = |than: &StageError| {
+        found.errors.random.rmse < than.random.rmse && found.errors.blocks.rmse < than.blocks.rmse
+    };
+    let arm_alone = found.fit.causes.iter().all(of_the_arm);
+    if !found.fit.causes.iter().any(of_the_arm) || arm_alone && better(&search.stages[1]) {
+        return found;
+    }
+    let causes = &search.extended.causes;
+    let without: Vec<bool> =
+        certain.iter().zip(causes).map(|(sure, cause)| *sure && !is_carried(cause)).collect();
+    let plain = of(&without);
+    if better(&plain.errors) { found } else { plain }
+}
+
+/// The certain model, or, with the probability, the same fitted without the causes of the measurement if these make a worse arm too
+/// probable.
+fn without_measurement_causes(
+    search: &Search<'_>,
+    certain: WrittenFit,
+    discrepancy: Option<&Discrepancy>,
+) -> (WrittenFit, Option<f64>) {
+    let of_the_arm: Vec<Cause> =
+        certain.fit.causes.iter().filter(|cause| matches!(cause, Cause::Arm(_))).cloned().collect();
+    if of_the_arm.len() == certain.fit.causes.len() && time_discrepancy(discrepancy).is_none() {
+        return (certain, None);
+    }
+    let SearchContext { dataset, subject, .. } = search.context;
+    let correlated = discrepancy.filter(|d| d.correlation > 0.0);
+    let without = written(search, &of_the_arm, correlated);
+    let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
+    let beside = in_doubt::with_zero_causes(&without, certain.fit.clone());
+    match probability_worse(&certain.fit, &beside, &mean_condition(dataset), &samples) {
+        Some(probability) if probability > sensor_causes::MOST_PROBABILITY => {
+            (WrittenFit { errors: search.validation.stage(&without), fit: without }, Some(probability))
+        }
+        _ => (certain, None),
+    }
+}
+
+/// The written arm extended by uncertain causes of size 0; `None` if it includes all causes already.
+fn with_uncertain_causes(
+    search: &Search<'_>,
+    fit: &Extended,
+    discrepancy: Option<&Discrepancy>,
+) -> Option<Extended> {
+    let all = in_doubt::representable_causes(&search.extended.causes, &search.accepted);
+    let missing = |cause: &Cause| !contains_cause(&fit.causes, cause);
+    all.iter().any(missing).then(|| in_doubt::with_zero_causes(fit, written(search, &all, discrepancy)))
+}
+
+/// What a written arm is judged by.
+struct Judged<'a> {
+    fitted: &'a Fitted,
+    parameters: &'a [EstimatedParameter],
+    benefit: Result<&'a Benefit, &'a NoBenefit>,
+    sensor: Sensor,
+    /// That the poses do not show the target's place on the flange.
+    unseen_target: Option<String>,
+    /// Errors of the data sheet, of geometry, and of the fit.
+    stages: [StageError; 3],
+    options: &'a Options,
+}
+
+/// The verdict of an identification, plus: findings must not raise the held-out error of geometry.
+fn judge(case: &Judged<'_>) -> Verdict {
+    let mut verdict = VerdictBuilder::default();
+    let stages = &case.stages;
+    if case.fitted.termination().is_converged() {
+        verdict.note(CONVERGED);
+    } else {
+        verdict.fail(format!("the fit did not converge: {}", case.fitted.termination()));
+    }
+    if stages[2].blocks.rmse > stages[1].blocks.rmse * 1.05 && stages[2].random.rmse > stages[1].random.rmse {
+        verdict.fail(format!(
+            "the held-out error is {:.3} mm with the findings, but {:.3} mm with geometry alone",
+            stages[2].random.rmse, stages[1].random.rmse
+        ));
+    }
+    verdict.check_links(case.parameters, &case.options.arm_tolerance, LINK_Z);
+    verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
+    verdict.check_benefit(case.benefit, case.sensor);
+    if let Some(unseen_target) = &case.unseen_target {
+        verdict.note(unseen_target.as_str());
+    }
+    verdict.check_limits(&case.options.limits, &stages[2].random);
+    verdict.build()
+}

@@ -1,0 +1,179 @@
+//! The noise floor from repeated poses, and whether readings that are equal to the last digit are copies.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::dataset::{Dataset, Reading, Row};
+use super::repeated_poses::with_poses;
+
+/// Scatter of repeated poses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseFloor {
+    /// Pooled standard deviation of a length, or of the position (root of the sum over the coordinates) (mm).
+    pub sigma_mm: f64,
+    /// Number of poses that were measured more than once.
+    pub poses: usize,
+    /// Degrees of freedom: rows of these poses minus poses.
+    pub freedom: usize,
+}
+
+/// Fewest degrees of freedom of a known noise floor: of one repeated pose the scatter is right to a factor of ten or so.
+const FEWEST_FREEDOM: usize = 4;
+
+impl NoiseFloor {
+    /// Whether enough poses were repeated for the scatter to be that of the sensor.
+    pub fn is_known(&self) -> bool {
+        self.freedom >= FEWEST_FREEDOM
+    }
+}
+
+/// The noise floor from repeated poses: √(Σ |r − r̄|² / Σ (n − 1)) over poses with the same outlet and approach.
+/// `None` where no pose was repeated. Drift between the repetitions counts as noise. Copied rows show no noise: readings equal
+/// to the last digit count once if the others scatter too widely for that to be chance, or if there are no others.
+///
+/// ```
+/// use truegrind_calibration::measurement::import::{Options, read};
+/// use truegrind_calibration::measurement::noise_floor::noise_floor;
+///
+/// let csv = "q1,q2,q3,q4,q5,q6,L\n1,2,3,4,5,6,500.00\n9,2,3,4,5,6,612.00\n1,2,3,4,5,6,500.06\n1,2,3,4,5,6,500.03\n";
+/// let rows = read("poses.csv", csv.as_bytes(), &Options::default())?;
+/// let floor = noise_floor(&rows).ok_or("no pose was repeated")?;
+/// assert_eq!((floor.poses, floor.freedom), (1, 2));
+/// assert!((floor.sigma_mm - 0.03).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
+    pooled_scatter_by(data, |row, _| Some(row.reading.place_mm()))
+}
+
+/// The noise floor of orientations (rad), from rotation vectors relative to the first reading of each pose, as the root of the
+/// sum over the coordinates. `None` where no pose was repeated or the sensor measures no orientation.
+pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
+    let turn = |row: &Row| if let Reading::Pose(pose) = &row.reading { Some(pose.rotation) } else { None };
+    let mut first = None;
+    let against = |row: &Row, begins: bool| {
+        let here = turn(row)?;
+        let first = *if begins { first.insert(here) } else { first.get_or_insert(here) };
+        Some((first.inverse() * here).scaled_axis())
+    };
+    pooled_scatter_by(data, against).map(|floor| floor.sigma_mm)
+}
+
+/// Pooled scatter of repeated readings without copies, of a quantity relative to the first row of its pose, outlet and approach (flagged by `true`).
+fn pooled_scatter_by(
+    data: &Dataset,
+    quantity: impl FnMut(&Row, bool) -> Option<Vector3<f64>>,
+) -> Option<NoiseFloor> {
+    let repeats = Repeats::of(data, quantity);
+    let all = repeats.all.pooled()?;
+    if repeats.are_copied() { repeats.own.pooled() } else { Some(all) }
+}
+
+/// Whether repeated readings that are equal to the last digit may be so by chance: the sensor's steps are coarse for its scatter.
+pub(super) fn repeats_agree_by_chance(data: &Dataset) -> bool {
+    !repeats_of_readings(data).are_copied()
+}
+
+/// The same of readings at different times, which may all be equal where the steps are coarse.
+pub(super) fn repeats_may_all_agree(data: &Dataset) -> bool {
+    let is_coarse = data.reading_step_mm.is_some_and(|step| step > FINE_STEP_MM);
+    is_coarse && repeats_of_readings(data).own.pooled().is_none()
+}
+
+fn repeats_of_readings(data: &Dataset) -> Repeats {
+    Repeats::of(data, |row, _| Some(row.reading.place_mm()))
+}
+
+/// Step of readings above which they may all be equal at a pose (mm).
+const FINE_STEP_MM: f64 = 0.005;
+
+/// Readings of poses that were measured more than once with the same outlet and approach.
+struct Repeats {
+    /// All readings.
+    all: Scatter,
+    /// Without those that equal an earlier one to the last digit.
+    own: Scatter,
+    /// The finest step between two of them (mm).
+    finest_mm: f64,
+}
+
+impl Repeats {
+    fn of(data: &Dataset, mut quantity: impl FnMut(&Row, bool) -> Option<Vector3<f64>>) -> Self {
+        with_poses(data, |poses| {
+            let mut out = Self { all: Scatter::default(), own: Scatter::default(), finest_mm: f64::INFINITY };
+            for pose in poses.filter(|pose| pose.len() > 1) {
+                let mut alike: BTreeMap<(usize, [i8; 6]), Vec<usize>> = BTreeMap::new();
+                for &i in pose {
+                    let row = &data.rows[i];
+                    alike.entry((row.anchor, row.condition.approach)).or_default().push(i);
+                }
+                for rows in alike.into_values().filter(|rows| rows.len() > 1) {
+                    let of = |(k, &i): (usize, &usize)| quantity(&data.rows[i], k == 0);
+                    let readings: Vec<Vector3<f64>> = rows.iter().enumerate().filter_map(of).collect();
+                    out.all.add(&readings);
+                    out.own.add(&distinct(&readings));
+                    out.finest_mm = out.finest_mm.min(finest_step_mm(&readings));
+                }
+            }
+            out
+        })
+    }
+
+    /// Whether equal readings are copies: the others scatter too widely for that to be chance, or there are no others.
+    fn are_copied(&self) -> bool {
+        self.own.pooled().is_none_or(|own| own.sigma_mm > COPY_RATIO * self.finest_mm)
+    }
+}
+
+/// Ratio of scatter to the finest step of readings above which readings equal to the last digit are copies, not chance.
+const COPY_RATIO: f64 = 10.0;
+
+/// Pooled scatter of readings of the same pose.
+#[derive(Default)]
+struct Scatter {
+    square: f64,
+    poses: usize,
+    freedom: usize,
+}
+
+impl Scatter {
+    /// Adds the readings of one pose; a single reading has no scatter.
+    fn add(&mut self, readings: &[Vector3<f64>]) {
+        if readings.len() > 1 {
+            let mean = readings.iter().sum::<Vector3<f64>>() / readings.len() as f64;
+            self.square += readings.iter().map(|r| (r - mean).norm_squared()).sum::<f64>();
+            self.freedom += readings.len() - 1;
+            self.poses += 1;
+        }
+    }
+
+    fn pooled(&self) -> Option<NoiseFloor> {
+        let Self { square, poses, freedom } = *self;
+        (freedom > 0).then(|| NoiseFloor { sigma_mm: (square / freedom as f64).sqrt(), poses, freedom })
+    }
+}
+
+/// Readings without those that equal an earlier one.
+fn distinct(readings: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mut out: Vec<Vector3<f64>> = Vec::with_capacity(readings.len());
+    for reading in readings {
+        if !out.contains(reading) {
+            out.push(*reading);
+        }
+    }
+    out
+}
+
+/// The smallest nonzero difference of a coordinate between readings of one pose (mm).
+fn finest_step_mm(readings: &[Vector3<f64>]) -> f64 {
+    let mut finest = f64::INFINITY;
+    for axis in 0..3 {
+        let mut values: Vec<f64> = readings.iter().map(|r| r[axis]).collect();
+        values.sort_by(f64::total_cmp);
+        // Differences by rounding of the last bit are 0.
+        let steps = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 1e-9);
+        finest = steps.fold(finest, f64::min);
+    }
+    finest
+}
