@@ -1,7 +1,7 @@
 //! Cuts: sequences of motions at process speed without a stop, corrected as a whole or not at all.
 //!
-//! A cut extends from one air move (MoveJ, MoveAbsJ, G0), stop (zone `fine`) or change of tool, work object or frame to the
-//! next. If one of its motions remained unmodified beside corrected neighbours, the tool would step by the whole correction
+//! A cut extends from one air move (MoveJ, MoveAbsJ, G0), stop (zone `fine`) or change of tool to the next; through another work object if
+//! that is placed as one with it. If one of its motions remained unmodified beside corrected neighbours, the tool would step by the whole correction
 //! in the middle of the part.
 //!
 //! Predecessor of a motion: the one that the text executes before it ([`Motion::previous`]) and, where loops, branches and
@@ -53,13 +53,15 @@ impl CutsOf {
     }
 }
 
-/// The cuts of a listing.
-pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
+/// The cuts of a listing. `part_of`: for each work object the first of those that are placed as one with it.
+pub(crate) fn of(listing: &Listing, treatment: Cuts, part_of: &[u32]) -> CutsOf {
     let motions = &listing.motions;
     let may_cut: Vec<bool> = motions.par_iter().with_min_len(MANY).map(may_cut).collect();
     let is_one_path = |start: u32, index: u32| {
         let [before, motion] = [start, index].map(|index| &motions[index as usize]);
-        may_cut[start as usize] && may_cut[index as usize] && listing.may_share_frames(before, motion)
+        may_cut[start as usize]
+            && may_cut[index as usize]
+            && (listing.may_share_frames(before, motion) || is_one_part(before, motion, part_of))
     };
     // The motion that each one goes on from, if they belong to one path.
     let starts: Vec<Option<u32>> = motions
@@ -99,14 +101,31 @@ pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
     CutsOf { of: of_all(root), path_of: of_all(path_root), runs_into }
 }
 
-/// Joins the sets of two motions; the smaller one represents both.
-fn unite(root: &mut [u32], a: u32, b: u32) {
+/// Whether two motions have one tool and work objects that are placed as one.
+pub(crate) fn is_one_part(a: &Motion, b: &Motion, part_of: &[u32]) -> bool {
+    let part = |motion: &Motion| motion.work_object.map(|object| part_of[object as usize]);
+    a.tool == b.tool && part(a).is_some() && part(a) == part(b)
+}
+
+/// Lines and arcs, each with a motion where it may begin: within a path, and where an air move leads to it.
+pub(crate) fn joins(listing: &Listing) -> impl Iterator<Item = [u32; 2]> {
+    let is_path = |index: u32| {
+        let motion = &listing.motions[index as usize];
+        matches!(motion.kind, MotionKind::Linear | MotionKind::Circular) && !motion.rapid
+    };
+    let all = (0..listing.motions.len() as u32).filter(move |index| is_path(*index));
+    let in_text = all.flat_map(|index| starts(listing, index).into_iter().map(move |start| [start, index]));
+    in_text.chain(listing.across_calls.iter().copied().filter(move |[_, index]| is_path(*index)))
+}
+
+/// Joins two sets; the smaller representative represents both.
+pub(crate) fn unite(root: &mut [u32], a: u32, b: u32) {
     let (a, b) = (find(root, a), find(root, b));
     root[a.max(b) as usize] = a.min(b);
 }
 
 /// Union-find representative, with path halving.
-fn find(root: &mut [u32], mut index: u32) -> u32 {
+pub(crate) fn find(root: &mut [u32], mut index: u32) -> u32 {
     while root[index as usize] != index {
         root[index as usize] = root[root[index as usize] as usize];
         index = root[index as usize];

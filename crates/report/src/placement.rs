@@ -70,7 +70,7 @@ fn named(placement: &ObjectPlacement, what: &str) -> String {
     let all: Vec<&str> = names(placement).collect();
     match all.as_slice() {
         [name] => format!("{what} {name}"),
-        all => format!("{what}s {} (one user frame)", all.join(", ")),
+        all => format!("{what}s {} (placed as one)", all.join(", ")),
     }
 }
 

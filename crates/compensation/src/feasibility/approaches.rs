@@ -1,11 +1,12 @@
 //! Approaches to cuts that remain unmodified: they lead to where the first line of the cut begins, which from a corrected start would become a
-//! wedge as high as the correction.
+//! wedge as high as the correction; and cuts whose approach is refused, which would become the same.
 
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
 use crate::cut::{CutsOf, Obstacle, may_cut, starts};
+use crate::deviation::Status;
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget::MANY;
 use truegrind_programs::motion::{Listing, MotionKind};
@@ -50,13 +51,49 @@ pub(crate) fn of_cuts_left(
             });
         }
     }
-    let comes_by_air = |index: u32| {
-        let starts = starts(listing, index);
-        !starts.is_empty() && starts.iter().all(|start| !may_cut(&listing.motions[*start as usize]))
-    };
     let is_approach = |index: u32| match cuts.root(index) {
         None => true,
-        Some(root) => motions_of_cut[&root] == 1 && comes_by_air(index),
+        Some(root) => motions_of_cut[&root] == 1 && comes_by_air(listing, index),
     };
     found.into_iter().filter(|(index, _)| is_approach(*index)).collect()
+}
+
+/// Whether only air moves lead to where a motion begins.
+fn comes_by_air(listing: &Listing, index: u32) -> bool {
+    let starts = starts(listing, index);
+    !starts.is_empty() && starts.iter().all(|start| !may_cut(&listing.motions[*start as usize]))
+}
+
+/// The lines and arcs that must not be corrected because the approach to where they begin is refused: from an uncorrected start the first line
+/// of the cut would become a wedge. `shift_mm`: how far the correction would have moved the start; `None` where that is unknown.
+pub(crate) fn of_starts_refused(
+    listing: &Listing,
+    blocking_reason: Obstacle<'_>,
+    tolerance_mm: f64,
+    shift_mm: &dyn Fn(u32) -> Option<f64>,
+) -> Vec<(u32, OutcomeReason)> {
+    let refused = |index: u32| match blocking_reason(index) {
+        Some((status, reason))
+            if status == Status::Refused || matches!(reason, OutcomeReason::Risk { .. }) =>
+        {
+            Some(reason)
+        }
+        _ => None,
+    };
+    let is_approach = |start: u32| !may_cut(&listing.motions[start as usize]) || comes_by_air(listing, start);
+    let mut out = Vec::new();
+    for (index, motion) in (0_u32..).zip(&listing.motions) {
+        let is_path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular) && may_cut(motion);
+        if !is_path || blocking_reason(index).is_some() {
+            continue;
+        }
+        let wedge = starts(listing, index).into_iter().find_map(|start| {
+            let reason = refused(start).filter(|_| is_approach(start))?;
+            let line = listing.motions[start as usize].place.line;
+            let moves = !shift_mm(start).is_some_and(|mm| mm <= tolerance_mm);
+            moves.then_some(OutcomeReason::PartOfCut { line, because: reason.kind() })
+        });
+        out.extend(wedge.map(|reason| (index, reason)));
+    }
+    out
 }

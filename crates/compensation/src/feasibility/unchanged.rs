@@ -58,7 +58,17 @@ pub(crate) fn unchanged_motions(
         } else {
             approaches::of_cuts_left(listing, cuts, &kept, options.tolerance_mm, &shift_mm)
         };
+        let known_mm = |motion: u32| {
+            let end = solved_so_far.of(motion as usize).last().and_then(|to| to.as_ref().ok());
+            end.map(SolvedTarget::shift_mm)
+        };
+        let from_refused = if listing.numbered || options.cuts == Cuts::Single {
+            Vec::new()
+        } else {
+            approaches::of_starts_refused(listing, &kept, options.tolerance_mm, &known_mm)
+        };
         out.extend(approaches);
+        out.extend(from_refused);
         out.extend(more);
         if out.len() == before && !forbidden {
             return out;

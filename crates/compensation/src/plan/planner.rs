@@ -30,6 +30,7 @@ use crate::plan::notes::{
 use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
 use crate::risk::assessment::{Assessment, AssessmentSample, EstimateContext, assess_program};
+use crate::risk::fixtures;
 use crate::risk::placement::PlacementChoice;
 use crate::risk::prepared_estimate::PreparedEstimate;
 use crate::search_budget;
@@ -80,9 +81,11 @@ impl<'a> SolvedProgram<'a> {
         let mut arms = Arms::of(estimate.arm, &options.condition);
         let mut frame_table = FrameTable::of(listing, &arms, cell, options.loads.is_some());
         let program = OriginalProgram::of(listing, &arms, &frame_table);
-        let cuts = cut::of(listing, options.cuts);
+        let part_of = fixtures::of(listing, &frame_table.taught(), options.joint_targets);
+        let cuts = cut::of(listing, options.cuts, &part_of);
+        let sample = AssessmentSample::of(listing, &cuts, part_of, |motion| program.knows(motion));
         let assessment =
-            assess(listing, &cuts, &program, &mut arms, &mut frame_table, options, &estimate.posterior);
+            assess(listing, sample, &program, &mut arms, &mut frame_table, options, &estimate.posterior);
         let solved_unchanged = assessment.risky();
         let solved = solve_targets(
             listing,
@@ -175,7 +178,7 @@ impl<'a> SolvedProgram<'a> {
 /// really lies.
 fn assess(
     listing: &Listing,
-    cuts: &CutsOf,
+    chosen: AssessmentSample,
     program: &OriginalProgram<'_>,
     arms: &mut Arms<'_>,
     frame_table: &mut FrameTable,
@@ -183,7 +186,6 @@ fn assess(
     posterior: &[PosteriorComponent],
 ) -> Assessment {
     let Some(knowledge) = arms.knowledge else { return Assessment::default() };
-    let chosen = AssessmentSample::of(listing, cuts, &frame_table.taught(), |motion| program.knows(motion));
     let loads = arms.loads(listing, options.loads.as_ref());
     let condition_indices: Vec<usize> = if loads.is_empty() {
         vec![arms.conditions.condition_index([0; 6], None); listing.motions.len()]

@@ -3,13 +3,13 @@
 //!
 //! Everything follows from evenly spaced targets of the original program, with every joint at mid-play.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use nalgebra::{DVector, Matrix6xX};
 use rayon::prelude::*;
 
 use crate::condition::arm_conditions::ArmConditions;
-use crate::cut::CutsOf;
+use crate::cut::{CutsOf, is_one_part};
 use crate::frames::frame_pair::ResolvedFrames;
 use crate::plan::reason::OutcomeReason;
 use crate::risk::cut_risk::{self, CutRisk, Judgement, PartRegistration};
@@ -43,6 +43,8 @@ pub(crate) struct Assessment {
     part_of_cut: Vec<usize>,
     /// The best registration of each part, in the base; absent where the robot holds it.
     registered: Vec<Option<RegisteredFrame>>,
+    /// The same for work objects that were taught by other points than the first of their part, by work object.
+    registered_apart: BTreeMap<u32, RegisteredFrame>,
 }
 
 impl Assessment {
@@ -58,9 +60,10 @@ impl Assessment {
     }
 
     /// The reference frame of the shape of a motion's cut: it moves with the arm's parameters as the path over the part does.
-    pub(crate) fn registered(&self, motion: u32) -> Option<CarriedFrame<'_>> {
+    pub(crate) fn registered(&self, motion: u32, work_object: Option<u32>) -> Option<CarriedFrame<'_>> {
         let part = self.part_of_cut[self.cut_index(motion)?];
-        self.registered[part].as_ref().map(RegisteredFrame::carried)
+        let apart = work_object.and_then(|object| self.registered_apart.get(&object));
+        apart.or(self.registered[part].as_ref()).map(RegisteredFrame::carried)
     }
 
     /// Sigma of the shape of a motion's cut (RMS, mm), for parts that the robot holds.
@@ -101,21 +104,20 @@ pub(crate) struct EstimateContext<'a, 'm> {
 
 /// The sampled targets of each work object and of each cut, including the point where it begins.
 pub(crate) struct AssessmentSample {
-    /// The work object of each entry of the listing: the first of those on one fixture.
+    /// The work object of each entry of the listing: the first of those that are placed as one.
     part_of: Vec<u32>,
     objects: Vec<(u32, Vec<u32>)>,
     cuts: Vec<(Vec<u32>, Vec<u32>)>,
 }
 
 impl AssessmentSample {
-    /// From those motions for which `reached` holds. `taught`: the work objects that were taught with this arm.
+    /// From those motions for which `reached` holds. `part_of`: for each work object the first of those that are placed as one with it.
     pub(crate) fn of(
         listing: &Listing,
         cuts: &CutsOf,
-        taught: &BTreeSet<u32>,
+        part_of: Vec<u32>,
         reached: impl Fn(usize) -> bool + Sync,
     ) -> Self {
-        let part_of = fixtures::of(listing, taught);
         let motions = listing.motions.par_iter().with_min_len(MANY).enumerate();
         let objects: Vec<Option<u32>> =
             motions.map(|(index, motion)| motion.work_object.filter(|_| reached(index))).collect();
@@ -137,7 +139,7 @@ impl AssessmentSample {
         let begin = |(root, index): (u32, u32)| {
             let motion = &listing.motions[index as usize];
             let before = motion.previous.filter(|before| cuts.path(*before) != Some(root))?;
-            listing.motions[before as usize].same_frames(motion).then_some(before)
+            is_one_part(&listing.motions[before as usize], motion, &part_of).then_some(before)
         };
         // Stable: the motions of a cut stay in order.
         in_cuts.sort_by_key(|(root, _)| *root);
@@ -201,11 +203,15 @@ pub(crate) fn assess_program(
             }
         }
         let ResolvedFrames { real, carried, .. } = &list[frames_index];
-        out.registered.push((!real.holds_part).then(|| {
+        let in_base = |carried: Option<&RegisteredFrame>| {
             let twists_of = twists.column_iter().map(|twist| twist.into_owned()).collect();
             let of_path = RegisteredFrame { origin_mm: registration.centre.coords, twists: twists_of };
-            cut_risk::in_base(of_path, &real.object, carried.as_ref())
-        }));
+            cut_risk::in_base(of_path, &real.object, carried)
+        };
+        out.registered.push((!real.holds_part).then(|| in_base(carried.as_ref())));
+        let of_part = list.iter().zip(objects).filter(|(_, of)| chosen.part_of[**of as usize] == *object);
+        let apart = of_part.filter(|(frames, _)| !real.holds_part && frames.carried != *carried);
+        out.registered_apart.extend(apart.map(|(frames, of)| (*of, in_base(frames.carried.as_ref()))));
         let index = out.registered.len() - 1;
         parts.insert(*object, Part { index, applied, reference: real.object, registration, twists });
     }

@@ -1,12 +1,16 @@
-//! Which work objects lie on one fixture, so that their places are one question.
+//! Which work objects are placed as one: those on one fixture, and those that a path joins.
 //!
 //! A controller's work object is a user frame, the fixture, and an object frame in it, the part. Parts on one fixture have places to each
 //! other that the program states and that no arm displaces: if the placement were decided for each, one part would move away from the other by
 //! the whole error of the placement.
+//!
+//! A path that goes on from one work object into another would have a step as high as that error where they meet, whether or not they stand
+//! on one fixture. So would a line whose start was reached in another work object, as with an approach in `wobj0`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use truegrind_programs::motion::{Frame, Listing, WorkObject};
+use crate::cut::{find, joins, unite};
+use truegrind_programs::motion::{Frame, Listing, MotionKind, WorkObject};
 
 /// What two work objects on one fixture have in common.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
@@ -17,9 +21,29 @@ enum Fixture {
     UserFrame([u64; 7], bool),
 }
 
-/// For each work object of a listing the first on the same fixture. `taught`: those that were taught with this arm, each by touches of its
-/// own.
-pub(crate) fn of(listing: &Listing, taught: &BTreeSet<u32>) -> Vec<u32> {
+/// For each work object of a listing the first of those that are placed as one with it. `taught`: those that were taught with this arm, each
+/// by touches of its own. `joint_targets`: whether joint targets are corrected too, so that they can begin a path.
+pub(crate) fn of(listing: &Listing, taught: &BTreeSet<u32>, joint_targets: bool) -> Vec<u32> {
+    let mut first = on_one_fixture(listing, taught);
+    for [start, index] in joins(listing) {
+        let [start, motion] = [start, index].map(|index| &listing.motions[index as usize]);
+        let (Some(a), Some(b)) = (start.work_object, motion.work_object) else { continue };
+        let begins = start.kind != MotionKind::AbsoluteJoint || joint_targets;
+        if a != b && begins && is_held(listing, a) == is_held(listing, b) {
+            unite(&mut first, a, b);
+        }
+    }
+    (0..first.len() as u32).map(|object| find(&mut first, object)).collect()
+}
+
+/// Whether the robot holds a work object: that moves with the flange and can have no displacement in common with one that stands. `None`
+/// where its value is not known, so that nothing on it is corrected.
+fn is_held(listing: &Listing, object: u32) -> Option<bool> {
+    listing.work_objects[object as usize].value.as_ref().ok().map(|value| value.robhold)
+}
+
+/// For each work object of a listing the first on the same fixture.
+fn on_one_fixture(listing: &Listing, taught: &BTreeSet<u32>) -> Vec<u32> {
     let taught_names: BTreeSet<String> = (0..)
         .zip(&listing.work_objects)
         .filter(|(index, _)| taught.contains(index))

@@ -352,7 +352,7 @@ fn solve_portion<'t>(
     let against = |w: &ReachableTarget<'_, '_>| {
         (
             frame_table.list[w.start.frames_index].carried.as_ref().map(RegisteredFrame::carried),
-            assessment.registered(cut_of(w)),
+            assessment.registered(cut_of(w), target_refs[w.index].motion.work_object),
         )
     };
     let predicted = sigmas(&reachable, &tools, &against, arms);

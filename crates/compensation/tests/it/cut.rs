@@ -189,6 +189,25 @@ fn the_approach_to_a_cut_that_is_left_stays_too() {
     );
 }
 
+/// The start of a cut was refused and its lines were corrected: the first one became a wedge as high as the correction.
+#[test]
+fn a_cut_whose_start_is_refused_stays_too() {
+    let air = |x: f64| line(x, "fine").replace("MoveL", "MoveJ");
+    let [a, b] = [(380.0, "z1"), (385.0, "fine")].map(|(x, zone)| line(x, zone));
+    let other = air(390.0) + &line(395.0, "fine");
+    for cuts in [Cuts::Whole, Cuts::Partial] {
+        let source = module(&[air(900.0), a.clone(), b.clone(), other.clone()].concat());
+        let (found, _) = done(&source, cuts, 0.05);
+        assert_eq!(statuses(&found), [Refused, Refused, Refused, Changed, Changed], "{cuts:?}");
+        let why = found.plan.outcomes[1].reason();
+        assert!(matches!(why, Some(OutcomeReason::PartOfCut { line: 4, .. })), "{why:?}");
+        // By a line to a stop.
+        let source = module(&[air(365.0), line(900.0, "fine"), a.clone(), b.clone(), other.clone()].concat());
+        let (found, _) = done(&source, cuts, 0.05);
+        assert_eq!(statuses(&found)[1..], [Refused, Refused, Refused, Changed, Changed], "{cuts:?}");
+    }
+}
+
 /// A line that is written as joints, and of which no deviation is known, counted as one without a step.
 #[test]
 fn a_step_of_unknown_size_is_a_step() {

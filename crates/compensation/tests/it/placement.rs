@@ -138,10 +138,15 @@ fn two_objects(frames: [[[f64; 3]; 2]; 2]) -> String {
         let corners = [[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0]].map(|[x, y]| {
             format!("MoveL [[{x},{y},0],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,fine,tool0\\WObj:={name};\n")
         });
-        corners.concat()
+        // No path joins the squares.
+        corners.concat().replacen("MoveL", "MoveJ", 1)
     };
     let data = declared("wA", frames[0]) + &declared("wB", frames[1]);
-    format!("MODULE M\n{data}PROC main()\nConfL\\Off;\n{}{}ENDPROC\nENDMODULE\n", square("wA"), square("wB"))
+    format!(
+        "MODULE M\n{data}PROC main()\nConfL\\Off;\nConfJ\\Off;\n{}{}ENDPROC\nENDMODULE\n",
+        square("wA"),
+        square("wB")
+    )
 }
 
 /// Two work objects in one user frame lie on one fixture: their placement was decided for each, so that the distance between them got the whole
@@ -197,6 +202,75 @@ fn work_objects_in_one_user_frame_are_placed_together() {
         assert_eq!(placed(&together, &taught, between).0.placements.len(), 2);
     }
     assert!(seen > 3, "{seen}");
+}
+
+/// A path through three work objects in user frames of their own, the first of which an air move leads to in `wobj0`. `start`: that move.
+fn one_path(start: &str) -> String {
+    let at = |[x, y]: [i32; 2]| format!("[[{x},{y},0],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    let line = |to: [i32; 2], zone: &str, object: &str| {
+        format!("MoveL {},v20,{zone},tool0\\WObj:={object};\n", at(to))
+    };
+    let lines = [
+        line([0, 0], "z1", "wA"),
+        line([60, 0], "z1", "wA"),
+        line([0, 0], "z1", "wB"),
+        line([60, 30], "fine", "wB"),
+        line([40, 40], "z1", "wC"),
+        line([-40, 60], "fine", "wC"),
+    ];
+    let frame = |name: &str, y: f64| {
+        format!("PERS wobjdata {name}:=[FALSE,TRUE,\"\",[[380,{y},300],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n")
+    };
+    let data = frame("wA", -120.0) + &frame("wB", -40.0) + &frame("wC", 60.0);
+    format!(
+        "MODULE M\n{data}PROC main()\nConfL\\Off;\nConfJ\\Off;\n{start}{}ENDPROC\nENDMODULE\n",
+        lines.concat()
+    )
+}
+
+/// A path through several work objects got a placement, and where only the shape was corrected a registration, in each of them: it had a step
+/// where they meet, and at a start that was reached in `wobj0` or by a joint target.
+#[test]
+fn one_path_has_one_placement() {
+    let (_, joints) = blade();
+    let by_air =
+        one_path("MoveJ [[330,-120,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n");
+    for seed in 0..3 {
+        let mut known = placed_somewhere(seed, &joints);
+        (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+        known.region.spacing_deg = 1e6;
+        let planned = |source: &str| {
+            let options = Options { max_risk: 1.0, joint_targets: true, ..with(Placement::Shape) };
+            rewritten(source.as_bytes(), &known, &Cell::default(), &options)
+        };
+        let start = planned(&by_air).0.points[0].joints_before.unwrap();
+        let start: Vec<String> = start.iter().map(|q| format!("{:.9}", q.to_degrees())).collect();
+        let by_joints = one_path(&format!(
+            "MoveAbsJ [[{}],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v100,fine,tool0;\n",
+            start.join(",")
+        ));
+        for source in [&by_air, &by_joints] {
+            let (plan, program) = planned(source);
+            let [placement] = plan.placements.as_slice() else { panic!("{:?}", plan.placements) };
+            assert_eq!(1 + placement.others.len(), 4, "{placement:?}");
+            let report = run_on(&known.model, source.as_bytes(), &program, &Cell::default());
+            // With the start.
+            let points: Vec<&PathPoint> = report.points.iter().collect();
+            assert_eq!(points.len(), 7);
+            let places: Vec<Vector3<f64>> = points.iter().map(|p| p.intended.translation.vector).collect();
+            let projector = rigid(&places);
+            let shape = |d: &DVector<f64>| (d - &projector * d).amax();
+            let (before, after) = (deviations(&points, false), deviations(&points, true));
+            assert!(shape(&before) > 0.01, "{}", shape(&before));
+            assert!(shape(&after) < 2e-3, "{}", shape(&after));
+        }
+        // What holds for one of them holds for all: nobody knows where one stands that was taught by unknown points.
+        let taught = Cell { wobj: vec![CellFrame::of("wB", FrameOrigin::Taught)], ..Cell::default() };
+        let options = Options { max_risk: 1.0, ..with(Placement::Auto) };
+        let (plan, _) = rewritten(by_air.as_bytes(), &known, &taught, &options);
+        let [placement] = plan.placements.as_slice() else { panic!("{:?}", plan.placements) };
+        assert_eq!((placement.applied, placement.unlocated), (Placement::Shape, true));
+    }
 }
 
 #[test]

@@ -363,7 +363,7 @@ fn work_objects_on_one_fixture_are_named_together() {
     plan.placements = vec![fixture.clone()];
     let text = sentences(&plan, &listing).join("\n");
     assert!(
-        text.contains("work objects wobj0, wB (one user frame): shape and placement are corrected"),
+        text.contains("work objects wobj0, wB (placed as one): shape and placement are corrected"),
         "{text}"
     );
     assert!(!text.contains("belong together"), "{text}");
