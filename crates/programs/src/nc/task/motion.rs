@@ -8,7 +8,8 @@ use super::super::arc::{Arc, Plane};
 use super::super::dialect::Dialect;
 use super::super::expression::Evaluated;
 use super::super::modal_group::{ARC_GROUPS, MOTION_GROUPS, ModalGroup, TOOL_GROUPS};
-use super::super::modal_state::{MotionMode, OrientationMode, all_known};
+use super::super::modal_state::{MotionMode, Orientation, OrientationMode, all_known};
+use super::super::orientation::Angles;
 use super::super::syntax::{Word, WordValue};
 use super::{Block, BlockArc, BlockContext, FlowPoint, Interpreter, StartDependency, StateEvent};
 use crate::motion::{
@@ -16,6 +17,34 @@ use crate::motion::{
     SpeedValue, Switch, TargetValue, Zone, ZoneValue,
 };
 use truegrind_math::option_f64::OptionF64;
+
+/// How far the two ways of turning the tool along a line may lie apart (rad).
+const ONE_WAY_RAD: f64 = 1e-3;
+
+/// Whether the tool turns alike along a line if A, B and C run linearly, as axes do, and if it turns about one axis. Which of the two a control
+/// does, its set-up decides (ORIAXES, ORIVECT; PATHCTRL): between ends for which they differ, no orientation can be inserted.
+fn turns_one_way(from: &Orientation, to: &Orientation, angles: Option<Angles>) -> bool {
+    let of = |orientation: &Orientation| match orientation.mode {
+        OrientationMode::Angles => Some((angles?, all_known(orientation.abc).ok()?)),
+        OrientationMode::Rpy => Some((Angles::Wpr, all_known(orientation.rpy).ok()?)),
+        OrientationMode::Vector | OrientationMode::Unknown(_) => None,
+    };
+    if to.mode == OrientationMode::Vector {
+        return true;
+    }
+    // Without a known start nothing is inserted.
+    let (Some((convention, start)), Some((other, end))) = (of(from), of(to)) else { return from == to };
+    if convention != other {
+        return false;
+    }
+    let [first, last] = [start, end].map(|values| convention.rotation(values));
+    start == end
+        || [0.25, 0.5, 0.75].iter().all(|&share| {
+            let linear = std::array::from_fn(|axis| start[axis] + share * (end[axis] - start[axis]));
+            let about_one_axis = first.try_slerp(&last, share, 1e-9);
+            about_one_axis.is_some_and(|turn| turn.angle_to(&convention.rotation(linear)) <= ONE_WAY_RAD)
+        })
+}
 
 impl Interpreter<'_, '_> {
     fn instruction(&mut self, name: &str) -> Shared<str> {
@@ -214,7 +243,7 @@ impl Interpreter<'_, '_> {
         let to = self.end_position(block, &from);
         let (name, kind) = name_and_kind(mode, heidenhain);
         let mut motion = self.new_motion(block, name, kind);
-        let old_rotation = self.state.rotation(self.angles);
+        let (old, old_rotation) = (self.state.orientation, self.state.rotation(self.angles));
         self.set_orientation(block, vector_words);
         let rotation = self.state.rotation(self.angles);
         let arc = self.targets(block, mode, [from, to], [old_rotation, rotation], &mut motion);
@@ -231,7 +260,9 @@ impl Interpreter<'_, '_> {
             motion.own_reason = Some(Reason::TurnAlone);
             motion.speed = None;
         }
-        let splits = !motion.timed && self.can_split(block, &before);
+        let splits = !motion.timed
+            && self.can_split(block, &before)
+            && turns_one_way(&old, &self.state.orientation, self.angles);
         motion.insertable = splits && kind == MotionKind::Linear && !block.flags.other_axes;
         motion.can_straighten = splits && arc.is_some() && !block.flags.opaque;
         motion.axis = arc.map(|block_arc| Box::new(block_arc.arc.plane.axis(block_arc.positive)));

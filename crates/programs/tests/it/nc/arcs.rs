@@ -187,3 +187,23 @@ fn no_block_is_inserted_before_one_that_starts_the_spindle() {
         }
     }
 }
+
+/// A control may turn the tool about one axis or run A, B and C as axes: where the two differ, no orientation is inserted.
+#[test]
+fn nothing_is_inserted_where_a_control_may_turn_the_tool_in_two_ways() {
+    let insertable = |words: &str| {
+        let source = format!("{HEAD}{}X50 {words}\nG2 X60 Y2 I5 J0\n", begin(LinuxCnc));
+        let setup = Setup { dialect: Some(LinuxCnc), ..Setup::default() };
+        let task = Task::read(&[("x", source.as_bytes())], &setup);
+        assert!(task.listing.motions[1].reason().is_none(), "{source}");
+        task.listing.motions[1].insertable
+    };
+    // About one axis, by little about several, and back and forth in the same orientation.
+    for words in ["C40", "A179 B1 C1", "A180 B0 C0"] {
+        assert!(insertable(words), "{words}");
+    }
+    // About several, and by whole turns, which end in the same orientation.
+    for words in ["A180 B20 C50", "A150 B30", "C360", "B20 C360"] {
+        assert!(!insertable(words), "{words}");
+    }
+}
