@@ -32,7 +32,7 @@
 //!
 //! **Slow changes.** A drift may stay below every bound, since the filter follows it. What counts for programs is the whole way from the
 //! model that they were corrected with: the [`Departure`], which is judged at the end of every run. A [`Turn`] about axis 1 that the sensor saw is part of
-//! it.
+//! it, and so is a move of the touched point that the [`LastLink`] may have made.
 //!
 //! **What no reading tells** of arm and sensor together stays as it was (`gauge`).
 //!
@@ -55,6 +55,7 @@ mod departure;
 mod error;
 mod first_noise;
 mod gauge;
+mod last_link;
 pub mod locate;
 mod model;
 mod mounting;
@@ -68,6 +69,7 @@ mod turn;
 pub use alarm::{Alarm, Course};
 pub use departure::{Departure, MovedParameter};
 pub use error::{StateError, TrackError};
+pub use last_link::LastLink;
 pub use noise::Overstated;
 pub use options::Options;
 pub use state::State;

@@ -73,7 +73,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     let (status, headline) = match (&departure, departed) {
         (_, Some(now)) if !now.is_of_shape => {
             let but = if alarms.is_empty() { ", but" } else { ";" };
-            (Status::Warning, format!("{processed}{but} {}", turn_headline(now)))
+            (Status::Warning, format!("{processed}{but} {}", unseen_headline(now)))
         }
         (_, Some(now)) => {
             let but = if alarms.is_empty() { ", but" } else { ";" };
@@ -100,11 +100,12 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         (None, None) => (Status::Good, processed),
     };
     let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
-    let earlier = departed.filter(|_| alarms.is_empty()).and_then(|now| now.reported.as_ref());
+    let earlier = departed.filter(|_| alarms.is_empty()).and_then(reported);
     reasons.extend(earlier.map(|alarm| format!("reported in an earlier run: {alarm}")));
     reasons.extend(departed.filter(|now| now.is_of_shape).map(departure_sentence));
     reasons.extend(departed.and_then(turn_sentence));
-    reasons.extend(which_moved(alarms));
+    reasons.extend(departed.and_then(|now| last_link_sentence(now, alarms)));
+    reasons.extend(which_moved(alarms, departed));
     let (status, headline) = if tracker.mostly_set_aside() {
         reasons.insert(
             0,
@@ -121,6 +122,10 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     if status == Status::Warning {
         reasons.push(
             match departed {
+                Some(now) if !now.is_of_shape && !has_turned(now) => {
+                    "what to do: check the mark of joint 6 and touch a known point with the tool. If they are right, the reflector moved: begin a new \
+                     track (--state). If not, measure the arm, identify it, and compensate the original programs again"
+                }
                 Some(now) if !now.is_of_shape => {
                     "what to do: find out what turned, as said above. If it was joint 1 or the base, put it right or teach the work objects \
                      again; then begin a new track (--state)"
@@ -162,6 +167,55 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     page.paragraph(format!("Model written: {model}"));
 }
 
+/// The last alarm that is not decided.
+fn reported(now: &Departure) -> Option<&Alarm> {
+    let of_last_link = || now.last_link.as_ref().filter(|moved| moved.is_significant)?.reported.as_ref();
+    now.reported.as_ref().or_else(of_last_link)
+}
+
+fn has_turned(now: &Departure) -> bool {
+    now.turn.as_ref().is_some_and(|turn| turn.is_significant)
+}
+
+/// The headline where the arm kept its shape.
+fn unseen_headline(now: &Departure) -> String {
+    let last_link = now.last_link.as_ref().filter(|_| !has_turned(now));
+    last_link.map_or_else(
+        || turn_headline(now),
+        |moved| {
+            format!(
+                "the touched point is {:.3} mm off, and joint 6 or the last link may be the reason: the programs are not known to remain valid",
+                moved.moved_mm
+            )
+        },
+    )
+}
+
+/// A move of the touched point that the last link may have made, what it may be, and how to tell.
+fn last_link_sentence(now: &Departure, alarms: &[Alarm]) -> Option<String> {
+    let moved = now.last_link.as_ref().filter(|moved| moved.is_significant)?;
+    let turned_deg = moved.angle_rad.abs().to_degrees();
+    let sigma = match moved.sigma_rad {
+        0.0 => String::new(),
+        sigma => format!(" ± {:.4}", sigma.to_degrees()),
+    };
+    // The alarm of this run tells the move.
+    let again = match (&moved.reported, alarms.is_empty()) {
+        (Some(_), false) => "the touched point",
+        _ => "since the first poses, the touched point has moved on the flange",
+    };
+    Some(format!(
+        "{again}: {:.3} mm. The reflector was exchanged or bumped: then the programs are right. Or joint 6 lost its zero (by {turned_deg:.4}{sigma}°), or the last \
+         link is bent: then a tool is off, by {:.3} mm at 150 mm from axis 6. The readings are the same. To tell: check the mark of \
+         joint 6, and touch a known point with the tool in two orientations of joint 6",
+        moved.moved_mm,
+        moved.angle_rad.abs() * TOOL_MM
+    ))
+}
+
+/// A tool's distance from axis 6 by which a lost zero of joint 6 is illustrated (mm).
+const TOOL_MM: f64 = 150.0;
+
 /// The headline where the arm turned and kept its shape.
 fn turn_headline(now: &Departure) -> String {
     now.turn.as_ref().map_or_else(String::new, |turn| {
@@ -190,9 +244,11 @@ fn turn_sentence(now: &Departure) -> Option<String> {
 }
 
 /// What readings cannot tell of the new changes, and what to measure.
-fn which_moved(alarms: &[Alarm]) -> Vec<String> {
+fn which_moved(alarms: &[Alarm], departed: Option<&Departure>) -> Vec<String> {
     let any = |mount: Mount| alarms.iter().any(|alarm| alarm.is_of(mount));
-    let target = any(Mount::Target).then(|| {
+    let is_open =
+        departed.is_some_and(|now| now.last_link.as_ref().is_some_and(|moved| moved.is_significant));
+    let target = (any(Mount::Target) && !is_open).then(|| {
         "the touched point: the arm in the model for programs stays as it was. A changed last link or a lost zero of joint 6 would move the \
          readings alike; if the reflector was neither exchanged nor bumped, check the mark of joint 6, and touch a known point with the tool"
             .to_owned()
@@ -308,6 +364,10 @@ pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
                 "turn_about_axis_1": now.turn.as_ref().map(|turn| json!({
                     "angle_rad": turn.angle_rad, "sigma_rad": turn.sigma_rad, "rms_mm": turn.rms_mm,
                     "significant": turn.is_significant,
+                })),
+                "touched_point": now.last_link.as_ref().map(|moved| json!({
+                    "moved_mm": moved.moved_mm, "joint_6_rad": moved.angle_rad, "joint_6_sigma_rad": moved.sigma_rad,
+                    "significant": moved.is_significant,
                 })),
                 "since_first_poses_mm": since_mm, "since_first_poses_expected_mm": since_expected_mm,
             })

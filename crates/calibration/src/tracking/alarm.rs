@@ -166,7 +166,11 @@ impl fmt::Display for Alarm {
             if let Some(turn) = self.parts.first() {
                 write!(f, " and turned by {:.2}°", turn.shift.to_degrees())?;
             }
-            return write!(f, "; {} poses agree on it, and tracking continues from there", self.poses);
+            write!(f, "; {} poses agree on it, and tracking continues from there", self.poses)?;
+            if let [rival, ..] = self.alternatives.as_slice() {
+                write!(f, "; {rival} would explain it as well")?;
+            }
+            return Ok(());
         }
         if self.parameter.is_empty() {
             return write!(

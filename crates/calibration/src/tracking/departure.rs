@@ -15,6 +15,7 @@
 use nalgebra::{DMatrix, Rotation3, Vector3};
 
 use super::alarm::{Alarm, Course};
+use super::last_link::LastLink;
 use super::tracker::Tracker;
 use super::turn::{Turn, is_of_joint_1};
 use crate::identification::rigid_motion_columns::{fill, place};
@@ -34,6 +35,8 @@ pub struct Departure {
     pub parameters: Vec<MovedParameter>,
     /// A turn about axis 1 against the sensor, which is not part of the distances.
     pub turn: Option<Turn>,
+    /// A move of the touched point that the last link may have made, which is not part of the distances either.
+    pub last_link: Option<LastLink>,
     /// An earlier or present alarm that tells a change of the arm.
     pub reported: Option<Alarm>,
     /// Whether the arm has another shape now.
@@ -117,9 +120,11 @@ impl Tracker {
         });
         let noise_mm = self.state.sigma_mm * (self.state.sensor.axes() as f64).sqrt();
         let reported = self.state.alarms.iter().rev().find(|alarm| self.tells_of_the_arm(alarm)).cloned();
-        // Joint 1 moves no shape: a turn about its axis counts by itself.
-        let reported_of_shape =
-            self.state.alarms.iter().any(|alarm| self.tells_of_the_arm(alarm) && !is_of_joint_1(alarm));
+        // Joint 1 and the last link move no shape: they count by themselves.
+        let is_of_shape = |alarm: &Alarm| {
+            self.tells_of_the_arm(alarm) && !is_of_joint_1(alarm) && !self.may_be_of_last_link(alarm)
+        };
+        let reported_of_shape = self.state.alarms.iter().any(is_of_shape);
         let sigmas = self.sigmas();
         let mut parameters: Vec<(f64, MovedParameter)> = self
             .initial
@@ -135,7 +140,7 @@ impl Tracker {
             })
             .collect();
         parameters.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let turn = self.turn(&poses);
+        let (turn, last_link) = (self.turn(&poses), self.last_link());
         let is_of_shape = whole.is_beyond(SHARE * self.initial.geometry.held_out.rmse)
             || since.as_ref().is_some_and(|since| since.is_beyond(SHARE * noise_mm))
             || (reported_of_shape && std::iter::once(&whole).chain(&since).any(|d| d.rms_mm > d.expected_mm));
@@ -145,8 +150,11 @@ impl Tracker {
             since_first_poses_mm: since.as_ref().map(|since| [since.rms_mm, since.expected_mm]),
             parameters: parameters.into_iter().map(|(_, parameter)| parameter).collect(),
             is_of_shape,
-            is_significant: is_of_shape || turn.as_ref().is_some_and(|turn| turn.is_significant),
+            is_significant: is_of_shape
+                || turn.as_ref().is_some_and(|turn| turn.is_significant)
+                || last_link.as_ref().is_some_and(|last_link| last_link.is_significant),
             turn,
+            last_link,
             reported,
         })
     }

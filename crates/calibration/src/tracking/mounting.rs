@@ -10,6 +10,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use super::alarm::{Alarm, Course, Mount, Part};
 use super::bounds::outlier_bound;
 use super::gauge::Gauge;
+use super::last_link::JOINT_6;
 use super::state::{PoseRecord, Snapshot, extend_region};
 use super::tracker::Tracker;
 use crate::identification::calibration::Frames;
@@ -82,7 +83,10 @@ impl Tracker {
         let history = &self.state.history;
         let poses: Vec<PoseRecord> = history[history.len() - run..].to_vec();
         let (found, old) = self.find_remount(&poses, beside)?;
-        let alarm = alarm_of(&found, &old, &poses, self.state.sensor.scalars());
+        let mut alarm = alarm_of(&found, &old, &poses, self.state.sensor.scalars());
+        if found.what == Mounted::Target && self.is_turn_of_joint_6(&old, &found.pose, found.scatter_mm) {
+            alarm.alternatives.push(JOINT_6.to_owned());
+        }
         self.apply_remount(&found, poses);
         Some(alarm)
     }

@@ -4,13 +4,14 @@ use nalgebra::{DMatrix, DVector};
 
 use super::alarm::{Alarm, Course, Mount, Part};
 use super::bounds::{outlier_bound, window_bound};
-use super::locate::{ALTERNATIVE_MARGIN, Change, Explanation, Form, Group, GroupChange, locate};
+use super::last_link::ZERO_LOST_RAD;
+use super::locate::{Change, Explanation, Form, Group, GroupChange, locate};
 use super::mounting::Beside;
 use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
-use truegrind_math::distribution::wilson_hilferty;
+use truegrind_math::distribution::{chi_square_quantile, wilson_hilferty};
 use truegrind_math::statistics::median;
 
 /// Smallest likelihood ratio of a change that is reported: 1 in 10⁵ for one parameter and one pose, 1 in a hundred after the
@@ -254,12 +255,14 @@ impl Tracker {
         (alarm.parameter, alarm.unit, alarm.course) =
             (group.mount.to_string(), "mm".to_owned(), Course::Jump);
         alarm.label = None;
+        let freedom = group.members.len().saturating_sub(1).max(1);
+        let margin = chi_square_quantile(UNLIKELY, freedom).max(NEARLY_ALL * together.ratio);
         let rivals = group.covers.iter().filter(|(k, largest)| {
             let near = |change: &&Change| change.parameter == *k && change.shift.abs() <= *largest;
             std::iter::once(&found.best)
                 .chain(&found.alternatives)
                 .filter(near)
-                .any(|change| change.ratio > together.ratio - ALTERNATIVE_MARGIN)
+                .any(|change| change.ratio > together.ratio - margin)
         });
         alarm.alternatives = rivals.map(|(k, _)| self.parameters[*k].to_string()).collect();
     }
@@ -406,7 +409,10 @@ fn largest_of_last_link(parameter: &Parameter) -> Option<f64> {
     }
 }
 
-/// Sizes up to which the last link or its joint are likely to have changed (rad, mm).
-const ZERO_LOST_RAD: f64 = 0.09;
+/// A part of a group is its rival where the group explains more only as in one of so many cases, or by no more than this share.
+const UNLIKELY: f64 = 1e-3;
+const NEARLY_ALL: f64 = 0.01;
+
+/// Sizes up to which the last link is likely to have changed (rad, mm).
 const BENT_RAD: f64 = 0.003;
 const BENT_MM: f64 = 0.3;
