@@ -341,7 +341,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// A call is listed; the pose after it is unknown. A program that is not in the file may also change the modal
-    /// state: it is assumed not to, and the call is listed in [`crate::motion::Listing::external_calls`].
+    /// state: it is assumed not to, and the call is listed in [`crate::motion::NcFacts::external_calls`].
     pub(super) fn subprogram(&mut self, block: &Block<'_>, name: &str) {
         let callee = self.callee(block);
         let is_own = match &callee {
