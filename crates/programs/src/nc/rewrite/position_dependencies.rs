@@ -303,7 +303,8 @@ impl Task<'_> {
         let restates = context.can_restate && known && slots.axes.iter().any(Option::is_some);
         let elsewhere = machine || returns || reason == Some(Reason::ExternalOnly);
         let states_axis = slots.axes.iter().any(Option::is_some);
-        let states_any = states_axis || slots.angles.iter().any(Option::is_some);
+        let arc = slots.radius.is_some() || slots.centre.iter().any(Option::is_some);
+        let states_any = states_axis || slots.turns || arc;
         let moves = match motion.kind {
             MotionKind::Unknown if reason == Some(Reason::Subprogram) => false,
             // A word that was not read may have been that of an axis.

@@ -18,6 +18,8 @@ pub(super) struct WordSlots<'s> {
     pub(super) centre: [Option<Word<'s>>; 3],
     pub(super) spin: Option<Word<'s>>,
     pub(super) radius: Option<Word<'s>>,
+    /// Whether a word may turn the tool, in whichever way orientations are stated.
+    pub(super) turns: bool,
     pub(super) feed: Option<Word<'s>>,
     /// G90 or G91, as written.
     pub(super) distance: Option<Word<'s>>,
@@ -136,6 +138,7 @@ fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, context: &BlockContext) -> Wor
             continue;
         }
         comma = &*name == b",";
+        slots.turns |= may_turn(&name);
         after_m |= &*name == b"M" && !matches!(number_of(tree, &word), Some(91.0 | 92.0));
         if let Some(slot) = slots.slot(tree, dialect, context, &word, &name, radius_block) {
             *slot = Some(word);
@@ -173,6 +176,17 @@ fn number_of(tree: &NcTree<'_>, word: &Word<'_>) -> Option<f64> {
 fn is_axis_name(name: &[u8]) -> bool {
     matches!(name, [b'X'..=b'Z' | b'A'..=b'C' | b'U'..=b'W'])
         || matches!(name, [b'I', b'X'..=b'Z' | b'A'..=b'C' | b'U'..=b'W'])
+}
+
+fn may_turn(name: &[u8]) -> bool {
+    matches!(
+        name,
+        [b'A'..=b'C']
+            | [b'A'..=b'C', b'1'..=b'9']
+            | [b'I', b'A'..=b'C']
+            | [b'T', b'X'..=b'Z']
+            | b"THETA"
+    )
 }
 
 /// Whether a word itself states an increment (IC, IX) or an absolute value (AC).

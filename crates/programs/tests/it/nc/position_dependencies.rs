@@ -65,6 +65,18 @@ fn a_line_behind_a_canned_cycle_keeps_the_level_at_which_the_cycle_began() {
     assert_eq!(first(Fanuc, stated), Outcome::InPlace);
 }
 
+/// A left block that only turns the tool ends where the motion before does, in whatever way orientations are stated.
+#[test]
+fn a_block_that_only_turns_takes_over_the_position() {
+    for (dialect, body) in [
+        (Fanuc, "M98 P200\nM30\nO0200\nC-10.\nM99"),
+        (Siemens, "IF (R3)<=0 GOTOF M_1\nG70\nM_1:\nTHETA=5"),
+        (Siemens, "IF (R3)<=0 GOTOF M_1\nG70\nM_1:\nA3=0 B3=0 C3=1"),
+    ] {
+        assert_eq!(first(dialect, body), Outcome::Refused(Reason::BeforeOmitted), "{body}");
+    }
+}
+
 #[test]
 fn restated_or_independent_words_pin_nothing() {
     for body in [
