@@ -10,7 +10,7 @@ use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status as Became;
 use truegrind::compensation::options::{self, Circles, Emit};
 use truegrind::compensation::plan::reason::OutcomeReason;
-use truegrind::programs::motion::Mark;
+use truegrind::programs::motion::{Listing, Mark, Motion};
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::reading::Program;
 
@@ -69,7 +69,7 @@ pub struct Row {
     pub sigma_mm: Option<f64>,
     /// Stated distance of the path from the intended one (mm); none where it is not checked.
     pub bend_mm: Option<f64>,
-    /// Whether the listing knows the motion that ends where this one starts.
+    /// Whether the listing states where the motion starts.
     pub start_known: bool,
     /// Whether it is flagged since it rests on a configuration that the controller does not check.
     pub guessed: bool,
@@ -188,12 +188,18 @@ pub fn corrected_task(
             after_mm: outcome.after_mm.get(),
             sigma_mm: outcome.sigma_mm.get(),
             bend_mm: outcome.path_deviation_mm.get(),
-            start_known: motion.previous.is_some(),
+            start_known: start_known(program.listing(), motion),
             guessed: outcome.reason() == Some(OutcomeReason::UnknownStart),
             right: outcome.reason() == Some(OutcomeReason::NoChange),
         });
     }
     Ok(out)
+}
+
+/// Whether the end of the motion before is stated: the end of `Offs(p, i, 0, 0)` in a loop is not.
+fn start_known(listing: &Listing, motion: &Motion) -> bool {
+    let end = motion.previous.and_then(|previous| listing.motions[previous as usize].to());
+    end.is_some_and(|target| target.value.is_ok())
 }
 
 /// A program of which nothing is corrected.
@@ -207,7 +213,7 @@ fn refused(files: &[(&str, &[u8])], program: &Program<'_>, reason: &str) -> Corr
         after_mm: None,
         sigma_mm: None,
         bend_mm: None,
-        start_known: motion.previous.is_some(),
+        start_known: start_known(program.listing(), motion),
         guessed: false,
         right: false,
     });

@@ -58,38 +58,17 @@ pub(super) fn rewrite_program(
     let used = Some(Used::by(listing, &context.cell));
     let Compensated { mut plan, rewritten } =
         compensated(context, &program, Options { loads, ..context.options.clone() })?;
-    if let (Some(found), Some(corrector)) = (unreachable_motions(&plan), context.corrector) {
-        if let Some((motion, error)) = found.example.filter(|_| 2 * found.other_configuration > found.count) {
-            bail!(
-                "{}: {} of the motions are in reach of {} only in other configurations than the program states (line {}: {error}): \
-                 correct the configuration data, or use the model of the robot that runs it ({})",
-                programs.name(),
-                found.other_configuration,
-                corrector.arm.robot,
-                listing.motions[motion as usize].place.line,
-                corrector.model
-            );
-        }
-        let motions = found.count;
-        bail!(
-            "{}: hardly any of the {motions} motions is in reach of {} ({}): the program belongs to another robot, or its tool \
-             and work object are somewhere else (--cell); use the model of the robot that runs it",
-            programs.name(),
-            corrector.arm.robot,
-            corrector.model
-        );
-    }
+    refuse_unreachable(context, programs, &plan, listing)?;
     if marked.contains(&true) {
-        // Some modules of the task were corrected before. Modules without a mark have nothing to correct, or were missing then.
-        let open =
-            rewritten.files.iter().zip(&marked).position(|(file, marked)| !marked && !file.edits.is_empty());
+        // Modules without a mark have nothing to correct, or were missing when the others were corrected.
+        let mut files = rewritten.files.iter().zip(&marked);
+        let open = files.position(|(file, marked)| !marked && !file.edits.is_empty());
         let Some(open) = open else { return Ok(nothing_to_do(notes)) };
         let done = marked.iter().position(|marked| *marked).unwrap_or(0);
         bail!(
-            "{} is already compensated with this model, {} is not: give the original of {}",
+            "{0} is already compensated with this model, {1} is not: give the original of {0}",
             names[done],
-            names[open],
-            names[done]
+            names[open]
         );
     }
     planned();
@@ -124,6 +103,37 @@ pub(super) fn rewrite_program(
         std::mem::forget((program, plan, rewritten));
     }
     Ok(result)
+}
+
+/// Refuses a program whose motions the robot of the model cannot reach.
+fn refuse_unreachable(
+    context: &CompensateContext<'_>,
+    programs: &Programs,
+    plan: &Plan,
+    listing: &Listing,
+) -> anyhow::Result<()> {
+    let (Some(found), Some(corrector)) = (unreachable_motions(plan), context.corrector) else {
+        return Ok(());
+    };
+    if let Some((motion, error)) = found.example.filter(|_| 2 * found.other_configuration > found.count) {
+        bail!(
+            "{}: {} of the motions are in reach of {} only in other configurations than the program states (line {}: {error}): \
+             correct the configuration data, or use the model of the robot that runs it ({})",
+            programs.name(),
+            found.other_configuration,
+            corrector.arm.robot,
+            listing.motions[motion as usize].place.line,
+            corrector.model
+        );
+    }
+    let motions = found.count;
+    bail!(
+        "{}: hardly any of the {motions} motions is in reach of {} ({}): the program belongs to another robot, or its tool \
+         and work object are somewhere else (--cell); use the model of the robot that runs it",
+        programs.name(),
+        corrector.arm.robot,
+        corrector.model
+    );
 }
 
 /// Refuses a program of another robot, and one whose frames contradict the surface.

@@ -165,9 +165,8 @@ pub(crate) fn assess_program(
     with: &EstimateContext<'_, '_>,
     choice: PlacementChoice,
 ) -> Assessment {
-    let EstimateContext { conditions, knowledge, posterior } = *with;
     let mut out = Assessment {
-        posterior: posterior.to_vec(),
+        posterior: with.posterior.to_vec(),
         cut_of: vec![None; listing.motions.len()],
         ..Assessment::default()
     };
@@ -175,51 +174,97 @@ pub(crate) fn assess_program(
     for (object, motions) in &chosen.objects {
         let targets: Vec<AssessedTarget> = motions.iter().filter_map(|m| at(*m)).collect();
         let name = &listing.work_objects[*object as usize].name;
-        let found = assess_placement(name, &targets, list, conditions, knowledge, posterior, choice);
-        let Some(AssessedObject { mut placement, displacement, registration, twists }) = found else {
-            continue;
+        let Some(mut found) = placed(name, &targets, list, with, choice) else { continue };
+        found.placement.others = fixtures::other_names(listing, &chosen.part_of, *object);
+        let first = targets[0].frames_index;
+        let of_part = |of: &u32| chosen.part_of[*of as usize] == *object;
+        if let Some(motion) = found.displacement {
+            displace(list, objects, of_part, first, motion);
+        }
+        let part = out.register(found, list, objects, of_part, first);
+        parts.insert(*object, part);
+    }
+    out.judge_cuts(listing, chosen, at, list, with, &parts, choice.max_risk);
+    out
+}
+
+/// The placement of a part, with the measurement that would make its unknown position known.
+fn placed(
+    name: &str,
+    targets: &[AssessedTarget],
+    list: &[ResolvedFrames],
+    with: &EstimateContext<'_, '_>,
+    choice: PlacementChoice,
+) -> Option<AssessedObject> {
+    let EstimateContext { conditions, knowledge, posterior } = *with;
+    let mut found = assess_placement(name, targets, list, conditions, knowledge, posterior, choice)?;
+    if found.placement.applied == Placement::Shape && choice.remedies {
+        let unknown = UnknownPlacement { targets, list, conditions, knowledge, max_risk: choice.max_risk };
+        found.placement.remedy = remedy_search::remedy(&unknown);
+    }
+    Some(found)
+}
+
+/// Displaces the work objects of a part by a motion in the frame of entry `first`.
+fn displace(
+    list: &mut [ResolvedFrames],
+    objects: &[u32],
+    of_part: impl Fn(&u32) -> bool,
+    first: usize,
+    motion: Pose,
+) {
+    let reference = list[first].real.object;
+    for (frames, _) in list.iter_mut().zip(objects).filter(|(_, of)| of_part(of)) {
+        let object = &mut frames.real.object;
+        *object = if *object == reference {
+            reference * motion
+        } else {
+            reference * motion * reference.inverse() * *object
         };
-        if placement.applied == Placement::Shape && choice.remedies {
-            let max_risk = choice.max_risk;
-            let unknown =
-                UnknownPlacement { targets: &targets, list: &*list, conditions, knowledge, max_risk };
-            placement.remedy = remedy_search::remedy(&unknown);
-        }
-        let applied = placement.applied;
-        placement.others = fixtures::other_names(listing, &chosen.part_of, *object);
-        out.placements.push(placement);
-        let frames_index = targets[0].frames_index;
-        if let Some(motion) = displacement {
-            let reference = list[frames_index].real.object;
-            let of_part =
-                list.iter_mut().zip(objects).filter(|(_, of)| chosen.part_of[**of as usize] == *object);
-            for (frames, _) in of_part {
-                let object = &mut frames.real.object;
-                *object = if *object == reference {
-                    reference * motion
-                } else {
-                    reference * motion * reference.inverse() * *object
-                };
-            }
-        }
-        let ResolvedFrames { real, carried, .. } = &list[frames_index];
+    }
+}
+
+impl Assessment {
+    /// Notes the placement of a part and the frames in the base that its shape refers to.
+    fn register(
+        &mut self,
+        found: AssessedObject,
+        list: &[ResolvedFrames],
+        objects: &[u32],
+        of_part: impl Fn(&u32) -> bool,
+        first: usize,
+    ) -> Part {
+        let AssessedObject { placement, registration, twists, .. } = found;
+        let ResolvedFrames { real, carried, .. } = &list[first];
         let in_base = |carried: Option<&RegisteredFrame>| {
             let twists_of = twists.column_iter().map(|twist| twist.into_owned()).collect();
             let of_path = RegisteredFrame { origin_mm: registration.centre.coords, twists: twists_of };
             cut_risk::in_base(of_path, &real.object, carried)
         };
-        out.registered.push((!real.holds_part).then(|| in_base(carried.as_ref())));
-        let of_part = list.iter().zip(objects).filter(|(_, of)| chosen.part_of[**of as usize] == *object);
+        self.registered.push((!real.holds_part).then(|| in_base(carried.as_ref())));
+        let of_part = list.iter().zip(objects).filter(|(_, of)| of_part(of));
         let apart = of_part.filter(|(frames, _)| !real.holds_part && frames.carried != *carried);
-        out.registered_apart.extend(apart.map(|(frames, of)| (*of, in_base(frames.carried.as_ref()))));
-        let index = out.registered.len() - 1;
-        parts.insert(*object, Part { index, applied, reference: real.object, registration, twists });
+        self.registered_apart.extend(apart.map(|(frames, of)| (*of, in_base(frames.carried.as_ref()))));
+        let applied = placement.applied;
+        self.placements.push(placement);
+        let index = self.registered.len() - 1;
+        Part { index, applied, reference: real.object, registration, twists }
     }
-    let list: &[ResolvedFrames] = list;
-    let judged: Vec<Option<(JudgedCut, Judgement, f64)>> = chosen
-        .cuts
-        .par_iter()
-        .map(|(motions, commanded)| {
+
+    /// Judges the cuts over the parts.
+    #[expect(clippy::too_many_arguments, reason = "the inputs of assess_program, with its parts")]
+    fn judge_cuts(
+        &mut self,
+        listing: &Listing,
+        chosen: AssessmentSample,
+        at: &(dyn Fn(u32) -> Option<AssessedTarget> + Sync),
+        list: &[ResolvedFrames],
+        with: &EstimateContext<'_, '_>,
+        parts: &BTreeMap<u32, Part>,
+        max_risk: f64,
+    ) {
+        let EstimateContext { conditions, knowledge, posterior } = *with;
+        let judge = |(motions, commanded): &(Vec<u32>, Vec<u32>)| {
             let targets: Vec<AssessedTarget> = commanded.iter().filter_map(|m| at(*m)).collect();
             let object = listing.motions[motions[0] as usize].work_object?;
             let Part { index, applied, reference, registration, twists } =
@@ -231,14 +276,27 @@ pub(crate) fn assess_program(
             let points = targets.len();
             let harm = probability_of_harm(judgement.square, &judgement.toward, posterior, points);
             Some((JudgedCut { placement: *applied, part: *index, points, weight }, judgement, harm))
-        })
-        .collect();
-    for ((motions, _), judged) in chosen.cuts.into_iter().zip(judged) {
-        let Some((judged, judgement, probability_of_harm)) = judged else { continue };
-        let left_for_risk = !(probability_of_harm <= choice.max_risk);
-        let cut_index = out.cuts.len() as u32;
-        motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(cut_index));
-        out.cuts.push(CutRisk {
+        };
+        let judged: Vec<Option<(JudgedCut, Judgement, f64)>> = chosen.cuts.par_iter().map(judge).collect();
+        for ((motions, _), judged) in chosen.cuts.into_iter().zip(judged) {
+            if let Some((cut, judgement, probability_of_harm)) = judged {
+                self.add_cut(motions, &cut, judgement, probability_of_harm, max_risk);
+            }
+        }
+    }
+
+    fn add_cut(
+        &mut self,
+        motions: Vec<u32>,
+        judged: &JudgedCut,
+        judgement: Judgement,
+        probability_of_harm: f64,
+        max_risk: f64,
+    ) {
+        let left_for_risk = !(probability_of_harm <= max_risk);
+        let cut_index = self.cuts.len() as u32;
+        motions.iter().for_each(|m| self.cut_of[*m as usize] = Some(cut_index));
+        self.cuts.push(CutRisk {
             motions,
             assessed: judged.placement,
             deviation_mm: judgement.deviation_mm,
@@ -248,14 +306,13 @@ pub(crate) fn assess_program(
             left_for_risk,
             corrected: false,
         });
-        out.part_of_cut.push(judged.part);
-        out.shares.push(CutContribution {
+        self.part_of_cut.push(judged.part);
+        self.shares.push(CutContribution {
             points: judged.weight * judged.points as f64,
             square: judged.weight * judgement.square,
             toward: judgement.toward * judged.weight,
         });
     }
-    out
 }
 
 /// How a cut was assessed.

@@ -181,11 +181,7 @@ fn is_axis_name(name: &[u8]) -> bool {
 fn may_turn(name: &[u8]) -> bool {
     matches!(
         name,
-        [b'A'..=b'C']
-            | [b'A'..=b'C', b'1'..=b'9']
-            | [b'I', b'A'..=b'C']
-            | [b'T', b'X'..=b'Z']
-            | b"THETA"
+        [b'A'..=b'C'] | [b'A'..=b'C', b'1'..=b'9'] | [b'I', b'A'..=b'C'] | [b'T', b'X'..=b'Z'] | b"THETA"
     )
 }
 
