@@ -144,6 +144,15 @@ struct TrackContext<'a> {
     state_path: &'a Path,
 }
 
+/// What processing the new files gave.
+#[derive(Default)]
+struct Processed {
+    alarms: Vec<Alarm>,
+    taking: Duration,
+    /// Whether a file failed.
+    failed: bool,
+}
+
 impl TrackContext<'_> {
     /// Processes all new data and writes model and state together. Returns whether an alarm was raised or a file failed. Messages in
     /// `printed` are not repeated.
@@ -177,33 +186,11 @@ impl TrackContext<'_> {
             }
         }
         let before = tracker.as_ref().map_or(0, |t| t.state().poses);
-        let mut alarms: Vec<Alarm> = Vec::new();
-        let mut taking = Duration::ZERO;
-        if let Some(tracker) = &mut tracker {
-            for dataset in &datasets {
-                if let Some(other) = tracker.copy_of(dataset) {
-                    let (file, other) = (&dataset.file, other.to_owned());
-                    print_message_once(
-                        printed,
-                        format!("note: {file} holds the same rows as {other}: they count once"),
-                    );
-                    continue;
-                }
-                let begun = Instant::now();
-                // After a panic on one file, continue with the state before that file.
-                let before = tracker.clone();
-                match catch_panic(|| Ok(tracker.process_file(dataset))) {
-                    Ok(raised) => alarms.extend(raised?),
-                    Err(defect) if self.arguments.data.is_dir() || arguments.follow.is_some() => {
-                        *tracker = before;
-                        failed = true;
-                        print_message_once(printed, format!("failed: {}: {defect:#}", dataset.file));
-                    }
-                    Err(defect) => return Err(defect),
-                }
-                taking += begun.elapsed();
-            }
-        }
+        let Processed { alarms, taking, failed: one_failed } = match &mut tracker {
+            Some(tracker) => self.process(tracker, &datasets, printed)?,
+            None => Processed::default(),
+        };
+        failed |= one_failed;
         let Some(tracker) = tracker else {
             if arguments.follow.is_some() {
                 return Ok(false);
@@ -228,6 +215,38 @@ impl TrackContext<'_> {
         let departed = tracker.departure().is_some_and(|departure| departure.is_significant);
         let is_worse = tracker.worse_fit().is_some();
         Ok(failed || !alarms.is_empty() || departed || is_worse || tracker.mostly_set_aside())
+    }
+
+    /// Processes new files, one after the other.
+    fn process(
+        &self,
+        tracker: &mut Tracker,
+        datasets: &[Dataset],
+        printed: &mut BTreeSet<String>,
+    ) -> anyhow::Result<Processed> {
+        let mut out = Processed::default();
+        for dataset in datasets {
+            if let Some(other) = tracker.copy_of(dataset) {
+                let (file, other) = (&dataset.file, other.to_owned());
+                let note = format!("note: {file} holds the same rows as {other}: they count once");
+                print_message_once(printed, note);
+                continue;
+            }
+            let begun = Instant::now();
+            // After a panic on one file, continue with the state before that file.
+            let before = tracker.clone();
+            match catch_panic(|| Ok(tracker.process_file(dataset))) {
+                Ok(raised) => out.alarms.extend(raised?),
+                Err(defect) if self.arguments.data.is_dir() || self.arguments.follow.is_some() => {
+                    *tracker = before;
+                    out.failed = true;
+                    print_message_once(printed, format!("failed: {}: {defect:#}", dataset.file));
+                }
+                Err(defect) => return Err(defect),
+            }
+            out.taking += begun.elapsed();
+        }
+        Ok(out)
     }
 
     /// The state of the last run.

@@ -51,6 +51,22 @@ pub(super) struct FindingBuilder<'a> {
     pub(super) set_aside: &'a [usize],
 }
 
+/// The model without a cause, and what each predicts of held-out rows.
+#[derive(Clone, Copy)]
+struct Beside<'a> {
+    without: &'a Design,
+    held: &'a Reduced<'a>,
+    before_mm: f64,
+    after_mm: f64,
+}
+
+/// Whether a cause is told apart from every alternative.
+struct Verdict {
+    clear: bool,
+    alternatives: Vec<Alternative>,
+    doubts: Vec<String>,
+}
+
 impl FindingBuilder<'_> {
     /// The findings, the index of each cause's finding, and their pictures. Causes of the same effect and joint share one.
     pub(super) fn findings(
@@ -177,47 +193,32 @@ impl FindingBuilder<'_> {
         own.rivals.iter().take(3).map(alternative).collect()
     }
 
-    fn finding(&self, index: usize, own: &Accepted, after_mm: f64) -> (Finding, Picture) {
-        let cause = &self.extended.causes[index];
-        let parameters = words::found_parameters(self.extended, index);
-        let places = self.found.parameter_indices(index);
-        let without = self.whole.without(&places);
-        let held = self.held.without(&places);
-        let before_mm = held.rmse_mm(None, self.set_aside);
-        let mut alternatives = self.rivals(own, &without, &held);
+    /// Compares a cause with its alternatives.
+    fn verdict(&self, cause: &Cause, own: &Accepted, beside: &Beside<'_>) -> Verdict {
+        let Beside { without, held, before_mm, after_mm } = *beside;
+        let mut alternatives = self.rivals(own, without, held);
         let mut clear = alternatives.iter().all(|rival| is_beaten(rival, after_mm));
+        let plain = |effect, family, cv_rmse_mm, beaten_by| Alternative {
+            effect,
+            joints: None,
+            rows: None,
+            family,
+            cv_rmse_mm,
+            beaten_by,
+        };
         // A finding that raises the held-out error is not confirmed, however well it fits the other rows.
         let unconfirmed = before_mm < BETTER * after_mm;
         if unconfirmed || own.information_beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
             clear = false;
-            alternatives.insert(
-                0,
-                Alternative {
-                    effect: CauseKind::LinkGeometry,
-                    joints: None,
-                    rows: None,
-                    family: Family::Arm,
-                    cv_rmse_mm: before_mm,
-                    beaten_by: own.own.merit,
-                },
-            );
+            alternatives.insert(0, plain(CauseKind::LinkGeometry, Family::Arm, before_mm, own.own.merit));
         }
-        let mut doubts = Vec::new();
         if let Some(effect) = same_readings(cause) {
             clear = false;
             alternatives.retain(|other| other.effect != effect);
-            alternatives.insert(
-                0,
-                Alternative {
-                    effect,
-                    joints: None,
-                    rows: cause.rows(),
-                    family: Family::SetUp,
-                    cv_rmse_mm: after_mm,
-                    beaten_by: 0.0,
-                },
-            );
+            let rows = cause.rows();
+            alternatives.insert(0, Alternative { rows, ..plain(effect, Family::SetUp, after_mm, 0.0) });
         }
+        let mut doubts = Vec::new();
         if self.is_any_curve(cause) {
             clear = false;
             doubts.push(
@@ -228,15 +229,26 @@ impl FindingBuilder<'_> {
         if let Some(map) = self.any_curve(cause)
             && !alternatives.iter().any(|a| a.effect == map.cause.kind())
         {
-            alternatives.push(Alternative {
-                effect: map.cause.kind(),
-                joints: pendant(&map.cause.joints()),
-                rows: None,
-                family: decision::family_of(&map.cause),
-                cv_rmse_mm: held.rmse_mm(Some((&map.columns(&without), &map.cause.sizes())), self.set_aside),
-                beaten_by: own.own.merit - score(&without, &map).merit,
-            });
+            let columns = map.columns(without);
+            let cv_rmse_mm = held.rmse_mm(Some((&columns, &map.cause.sizes())), self.set_aside);
+            let beaten_by = own.own.merit - score(without, &map).merit;
+            let family = decision::family_of(&map.cause);
+            let joints = pendant(&map.cause.joints());
+            alternatives
+                .push(Alternative { joints, ..plain(map.cause.kind(), family, cv_rmse_mm, beaten_by) });
         }
+        Verdict { clear, alternatives, doubts }
+    }
+
+    fn finding(&self, index: usize, own: &Accepted, after_mm: f64) -> (Finding, Picture) {
+        let cause = &self.extended.causes[index];
+        let parameters = words::found_parameters(self.extended, index);
+        let places = self.found.parameter_indices(index);
+        let without = self.whole.without(&places);
+        let held = self.held.without(&places);
+        let before_mm = held.rmse_mm(None, self.set_aside);
+        let beside = Beside { without: &without, held: &held, before_mm, after_mm };
+        let Verdict { clear, alternatives, doubts } = self.verdict(cause, own, &beside);
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
         let picture = picture(self.subject, cause, &without, &self.whole.design);

@@ -30,6 +30,13 @@ pub(super) struct MergedFinding {
     pub(super) doubted: Vec<usize>,
 }
 
+impl MergedFinding {
+    /// A finding on the record or the data sheet, which no cause of the fit stands behind.
+    pub(super) fn without_cause(finding: Finding) -> Self {
+        Self { finding, picture: None, causes: Vec::new(), doubted: Vec::new() }
+    }
+}
+
 /// Number of shifts from which they are merged.
 const MANY_SHIFTS: usize = 3;
 

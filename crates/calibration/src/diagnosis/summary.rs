@@ -59,19 +59,7 @@ pub(super) fn summarise(
     let contributions = Contributions::new(searched, &search.found, &confirmed.whole);
     let Findings { of_causes, finding_of_cause, pictures, of_links } =
         findings(search, confirmed, &extended, &contributions, &mut steps);
-    let confounding = Confounding {
-        causes: &search.found.causes,
-        confirmations: &outcome.confirmations,
-        contributions: &contributions,
-        nominal: subject.nominal,
-        by_one_cable: context.dataset.sensor == Sensor::Cable && subject.frames.outlets_mm.len() == 1,
-        growth_mm: outcome.discrepancy.growth_mm(),
-        field_mm: outcome.discrepancy.field_mm(),
-        excess_over_noise_mm: floor.map_or(0.0, |floor| {
-            let coordinates = context.dataset.sensor.axes();
-            excess_over_noise_mm(stages[2].fitted.rmse, floor.sigma_mm, coordinates * floor.freedom)
-        }),
-    };
+    let confounding = confounding(search, confirmed, &contributions, floor.as_ref());
     let mut findings = merged::merge_findings(
         merged::from_findings(of_causes, &finding_of_cause, pictures),
         &outcome.confirmations,
@@ -111,12 +99,7 @@ pub(super) fn summarise(
         unexplained_finding,
     ];
     let without_causes = of_the_record.into_iter().flatten().chain(of_links);
-    findings.extend(without_causes.map(|finding| MergedFinding {
-        finding,
-        picture: None,
-        causes: Vec::new(),
-        doubted: Vec::new(),
-    }));
+    findings.extend(without_causes.map(MergedFinding::without_cause));
     merged::rank(&mut findings);
     Summary {
         findings,
@@ -127,6 +110,30 @@ pub(super) fn summarise(
         remaining: unexplained.sentence(),
         something_else,
         joint_scatter: unexplained.scatter().cloned(),
+    }
+}
+
+/// What keeps a cause of the arm from being told apart from the sensor's faults.
+fn confounding<'s>(
+    search: &'s Search<'_>,
+    confirmed: &'s Confirmed,
+    contributions: &'s Contributions,
+    floor: Option<&NoiseFloor>,
+) -> Confounding<'s> {
+    let (context, outcome) = (search.context, &confirmed.outcome);
+    let subject = &context.subject;
+    Confounding {
+        causes: &search.found.causes,
+        confirmations: &outcome.confirmations,
+        contributions,
+        nominal: subject.nominal,
+        by_one_cable: context.dataset.sensor == Sensor::Cable && subject.frames.outlets_mm.len() == 1,
+        growth_mm: outcome.discrepancy.growth_mm(),
+        field_mm: outcome.discrepancy.field_mm(),
+        excess_over_noise_mm: floor.map_or(0.0, |floor| {
+            let coordinates = context.dataset.sensor.axes();
+            excess_over_noise_mm(search.stages[2].fitted.rmse, floor.sigma_mm, coordinates * floor.freedom)
+        }),
     }
 }
 

@@ -125,21 +125,6 @@ impl Tracker {
             self.tells_of_the_arm(alarm) && !is_of_joint_1(alarm) && !self.may_be_of_last_link(alarm)
         };
         let reported_of_shape = self.state.alarms.iter().any(is_of_shape);
-        let sigmas = self.sigmas();
-        let mut parameters: Vec<(f64, MovedParameter)> = self
-            .initial
-            .order
-            .iter()
-            .enumerate()
-            .filter_map(|(k, parameter)| {
-                let (moved, first) = (self.filter.x[k], self.initial.covariance[(k, k)].max(0.0).sqrt());
-                let counts = moved.abs() > PARAMETER_SIGMAS * first;
-                let (name, unit) = (parameter.to_string(), parameter.unit().to_owned());
-                let parameter = MovedParameter { name, unit, by: moved, sigma: sigmas[k] };
-                counts.then_some((moved.abs() / first.max(f64::MIN_POSITIVE), parameter))
-            })
-            .collect();
-        parameters.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (turn, last_link) = (self.turn(&poses), self.last_link());
         let is_of_shape = whole.is_beyond(SHARE * self.initial.geometry.held_out.rmse)
             || since.as_ref().is_some_and(|since| since.is_beyond(SHARE * noise_mm))
@@ -148,7 +133,7 @@ impl Tracker {
             rms_mm: whole.rms_mm,
             expected_mm: whole.expected_mm,
             since_first_poses_mm: since.as_ref().map(|since| [since.rms_mm, since.expected_mm]),
-            parameters: parameters.into_iter().map(|(_, parameter)| parameter).collect(),
+            parameters: self.moved_parameters(),
             is_of_shape,
             is_significant: is_of_shape
                 || turn.as_ref().is_some_and(|turn| turn.is_significant)
@@ -161,6 +146,21 @@ impl Tracker {
 }
 
 impl Tracker {
+    /// The parameters that moved by more than what the fit left open, the most certain first.
+    fn moved_parameters(&self) -> Vec<MovedParameter> {
+        let sigmas = self.sigmas();
+        let moved = self.initial.order.iter().enumerate().filter_map(|(k, parameter)| {
+            let (moved, first) = (self.filter.x[k], self.initial.covariance[(k, k)].max(0.0).sqrt());
+            let counts = moved.abs() > PARAMETER_SIGMAS * first;
+            let (name, unit) = (parameter.to_string(), parameter.unit().to_owned());
+            let parameter = MovedParameter { name, unit, by: moved, sigma: sigmas[k] };
+            counts.then_some((moved.abs() / first.max(f64::MIN_POSITIVE), parameter))
+        });
+        let mut parameters: Vec<(f64, MovedParameter)> = moved.collect();
+        parameters.sort_by(|a, b| b.0.total_cmp(&a.0));
+        parameters.into_iter().map(|(_, parameter)| parameter).collect()
+    }
+
     /// Whether an alarm tells a change of the arm, or one that nothing explains, rather than one of sensor or target.
     fn tells_of_the_arm(&self, alarm: &Alarm) -> bool {
         match alarm.course {

@@ -150,6 +150,9 @@ fn at(position: &Vector3<f64>) -> Pose {
     Pose::from_parts((*position).into(), nalgebra::UnitQuaternion::identity())
 }
 
+/// A tip by the nominal arm, by the estimated one, and how far the nominal one may lie from the programmed one.
+type TaughtTip = (Vector3<f64>, Vector3<f64>, FrameDistance);
+
 impl<'a> Teaching<'a> {
     pub(crate) fn of(
         nominal: &'a PreparedModel<'a>,
@@ -200,8 +203,6 @@ impl<'a> Teaching<'a> {
             return Ok(RealTool { pose: *commanded, moved_mm: None });
         }
         let name = &stated.name;
-        let joints = radians(&stated.teaching_deg);
-        let half = half_step_rad(&stated.teaching_deg);
         let told_tip = commanded.translation.vector;
         let (nominal, estimated, bound) = match (&stated.taught_with, held) {
             (Some(pointer), true) => {
@@ -211,48 +212,8 @@ impl<'a> Teaching<'a> {
                      objects and stationary tools)"
                 ));
             }
-            (Some(_), false) => {
-                let pointer = self.pointer(FrameKind::Tool, stated, true)?;
-                let tip = |arm: &PreparedModel<'_>, joints: &[Joints], tcp: &Vector3<f64>| {
-                    let touched = joints.iter().map(|q| (arm.forward(q) * Point3::from(*tcp)).coords);
-                    touched.sum::<Vector3<f64>>() / joints.len() as f64
-                };
-                let nominal = tip(self.nominal, &joints, &pointer.commanded);
-                let off = |q: &Joints| {
-                    ((self.nominal.forward(q) * Point3::from(pointer.commanded)).coords - nominal)
-                        .norm_squared()
-                };
-                let scatter = 3.0 * joints.iter().map(off).sum::<f64>().sqrt() / joints.len() as f64;
-                let round = rounded(&joints, half, |q| Some(at(&tip(self.nominal, q, &pointer.commanded))));
-                let loaded = self.loaded_with(pointer.load);
-                let estimated = loaded.as_ref().unwrap_or(self.estimated);
-                (nominal, tip(estimated, &joints, &pointer.real), explained(round, scatter))
-            }
-            (None, _) => {
-                let pick = |found: FixedPoint| if held { found.on_flange } else { found.in_base };
-                let alike = || {
-                    format!(
-                        "cell file: tool \"{name}\": its {} teaching points are too much alike to determine \
-                         the TCP: give four or more with the tool turned by 30° and more between them",
-                        joints.len()
-                    )
-                };
-                if joints.len() < 4 {
-                    return Err(format!(
-                        "cell file: tool \"{name}\": {} teaching points, expected at least 4 (a stationary \
-                         tool needs fewer with taught_with)",
-                        joints.len()
-                    ));
-                }
-                let nominal = fixed_point(self.nominal, &joints).ok_or_else(alike)?;
-                let loaded = self.loaded_with(load.filter(|_| held));
-                let estimated =
-                    fixed_point(loaded.as_ref().unwrap_or(self.estimated), &joints).ok_or_else(alike)?;
-                let round =
-                    rounded(&joints, half, |q| fixed_point(self.nominal, q).map(|found| at(&pick(found))));
-                let scatter = 3.0 * nominal.sigma_mm[usize::from(!held)];
-                (pick(nominal), pick(estimated), explained(round, scatter))
-            }
+            (Some(_), false) => self.touched_tip(stated)?,
+            (None, _) => self.fixed_tip(stated, held, load)?,
         };
         let apart = (nominal - told_tip).norm();
         if !(apart <= bound.mm) {
@@ -271,6 +232,55 @@ impl<'a> Teaching<'a> {
         let mut pose = *commanded;
         pose.translation.vector += shift;
         Ok(RealTool { pose, moved_mm: Some(shift.norm()) })
+    }
+
+    /// Where the tip of a stationary tool lies in the base, touched with a pointer: by the nominal arm, by the estimated
+    /// one, and how far the nominal one may be off.
+    fn touched_tip(&self, stated: &CellFrame) -> Result<TaughtTip, String> {
+        let joints = radians(&stated.teaching_deg);
+        let pointer = self.pointer(FrameKind::Tool, stated, true)?;
+        let tip = |arm: &PreparedModel<'_>, joints: &[Joints], tcp: &Vector3<f64>| {
+            let touched = joints.iter().map(|q| (arm.forward(q) * Point3::from(*tcp)).coords);
+            touched.sum::<Vector3<f64>>() / joints.len() as f64
+        };
+        let nominal = tip(self.nominal, &joints, &pointer.commanded);
+        let off = |q: &Joints| {
+            ((self.nominal.forward(q) * Point3::from(pointer.commanded)).coords - nominal).norm_squared()
+        };
+        let scatter = 3.0 * joints.iter().map(off).sum::<f64>().sqrt() / joints.len() as f64;
+        let half = half_step_rad(&stated.teaching_deg);
+        let round = rounded(&joints, half, |q| Some(at(&tip(self.nominal, q, &pointer.commanded))));
+        let loaded = self.loaded_with(pointer.load);
+        let estimated = loaded.as_ref().unwrap_or(self.estimated);
+        Ok((nominal, tip(estimated, &joints, &pointer.real), explained(round, scatter)))
+    }
+
+    /// The same for a tip that was held at one point (on the flange), or a point that was touched by one tip (in the base).
+    fn fixed_tip(&self, stated: &CellFrame, held: bool, load: Option<Load>) -> Result<TaughtTip, String> {
+        let name = &stated.name;
+        let joints = radians(&stated.teaching_deg);
+        let pick = |found: FixedPoint| if held { found.on_flange } else { found.in_base };
+        let alike = || {
+            format!(
+                "cell file: tool \"{name}\": its {} teaching points are too much alike to determine \
+                 the TCP: give four or more with the tool turned by 30° and more between them",
+                joints.len()
+            )
+        };
+        if joints.len() < 4 {
+            return Err(format!(
+                "cell file: tool \"{name}\": {} teaching points, expected at least 4 (a stationary \
+                 tool needs fewer with taught_with)",
+                joints.len()
+            ));
+        }
+        let nominal = fixed_point(self.nominal, &joints).ok_or_else(alike)?;
+        let loaded = self.loaded_with(load.filter(|_| held));
+        let estimated = fixed_point(loaded.as_ref().unwrap_or(self.estimated), &joints).ok_or_else(alike)?;
+        let half = half_step_rad(&stated.teaching_deg);
+        let round = rounded(&joints, half, |q| fixed_point(self.nominal, q).map(|found| at(&pick(found))));
+        let scatter = 3.0 * nominal.sigma_mm[usize::from(!held)];
+        Ok((pick(nominal), pick(estimated), explained(round, scatter)))
     }
 
     /// Resolves a work object.

@@ -12,7 +12,7 @@ mod call;
 mod invalidate;
 
 use super::evaluate::{Context, Evaluator, Known};
-use super::instruction::{self, Also, INSTRUCTIONS};
+use super::instruction::{self, Also, INSTRUCTIONS, Instruction};
 use super::modal::{Switch, SwitchSet, switches_set_by};
 use super::payload::{self, Gripped};
 use super::predefined;
@@ -513,18 +513,7 @@ impl Interpreter<'_, '_, '_> {
         let hidden = symbols.hides_instruction && symbols.routine(self.unit.scope, name).is_some();
         let known = known.filter(|_| !hidden);
         if let Some(known) = known {
-            if !known.only_moves() {
-                self.invalidate_written(node, state);
-            }
-            if known.also == Also::Stiffens {
-                state.modal = state.modal.set(Switch::Soft, false);
-            }
-            if motion.is_some() {
-                // A search stops where its signal comes, and a handler may resume from anywhere.
-                state.previous = motion.filter(|_| !known.ends_early() && !self.moved_between);
-                self.after_motion(motion, &mut state.reaching);
-                state.reaching.elsewhere |= known.ends_early();
-            }
+            self.transfer_motion_instruction(node, known, motion, state);
             return;
         }
         let incremented = self.incremented(node, state, name);
@@ -582,6 +571,28 @@ impl Interpreter<'_, '_, '_> {
             }
         }
         state.previous = None;
+    }
+
+    /// An instruction of the table of motions.
+    fn transfer_motion_instruction(
+        &mut self,
+        node: u32,
+        known: &Instruction,
+        motion: Option<u32>,
+        state: &mut AbstractState,
+    ) {
+        if !known.only_moves() {
+            self.invalidate_written(node, state);
+        }
+        if known.also == Also::Stiffens {
+            state.modal = state.modal.set(Switch::Soft, false);
+        }
+        if motion.is_some() {
+            // A search stops where its signal comes, and a handler may resume from anywhere.
+            state.previous = motion.filter(|_| !known.ends_early() && !self.moved_between);
+            self.after_motion(motion, &mut state.reaching);
+            state.reaching.elsewhere |= known.ends_early();
+        }
     }
 
     /// An instruction that sets switches (ConfL, PDispOn).

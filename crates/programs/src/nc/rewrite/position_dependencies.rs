@@ -10,8 +10,8 @@
 use std::collections::{BTreeSet, HashMap};
 
 use super::keeps_endpoint;
-use super::word_slots::states_increment;
-use crate::motion::{MotionKind, Reason};
+use super::word_slots::{WordSlots, states_increment};
+use crate::motion::{Motion, MotionKind, Reason};
 use crate::nc::dialect::Dialect;
 use crate::nc::expression::literal;
 use crate::nc::syntax::{NcTree, Word, WordValue};
@@ -303,17 +303,7 @@ impl Task<'_> {
         let restates = context.can_restate && known && slots.axes.iter().any(Option::is_some);
         let elsewhere = machine || returns || reason == Some(Reason::ExternalOnly);
         let states_axis = slots.axes.iter().any(Option::is_some);
-        let arc = slots.radius.is_some() || slots.centre.iter().any(Option::is_some);
-        let states_any = states_axis || slots.turns || arc;
-        let moves = match motion.kind {
-            MotionKind::Unknown if reason == Some(Reason::Subprogram) => false,
-            // A word that was not read may have been that of an axis.
-            MotionKind::Unknown if reason == Some(Reason::UnknownWord) => {
-                states_any || slots.mode.is_some() || dialect == Dialect::Heidenhain
-            }
-            MotionKind::Unknown => states_any || cycle,
-            _ => true,
-        };
+        let moves = may_move(motion, &slots, dialect);
         let gets_words = context.can_restate && states_axis;
         let before = state.position;
         for (axis, was) in before.iter().enumerate() {
@@ -368,6 +358,19 @@ impl Task<'_> {
                     Dependencies { path_dependent: !dependencies.is_empty(), ..dependencies };
             }
         }
+        self.pin_start_and_origin(index, known, elsewhere, &before, state);
+    }
+
+    /// Pins what an unmodified block depends on beyond the words of its axes: its start (arcs), and the origin.
+    fn pin_start_and_origin(
+        &self,
+        index: u32,
+        known: bool,
+        elsewhere: bool,
+        before: &[Dependencies; AXES],
+        state: &mut FileDependencies,
+    ) {
+        let motion = &self.listing.motions[index as usize];
         if self.start_dependency(index as usize, true) != StartDependency::Independent {
             let axes = self.pinned_start_axes(index as usize, true, 0);
             for axis in (0..3).filter(|axis| axes & 1 << axis != 0) {
@@ -379,6 +382,22 @@ impl Task<'_> {
             // Its words, or the subprogram, may be relative to the origin in any axis.
             (0..3).for_each(|axis| state.pin_origin(axis));
         }
+    }
+}
+
+/// Whether a block that is left may move an axis.
+fn may_move(motion: &Motion, slots: &WordSlots<'_>, dialect: Dialect) -> bool {
+    if motion.kind != MotionKind::Unknown {
+        return true;
+    }
+    let arc = slots.radius.is_some() || slots.centre.iter().any(Option::is_some);
+    let states_any = slots.axes.iter().any(Option::is_some) || slots.turns || arc;
+    match motion.reason() {
+        Some(Reason::Subprogram) => false,
+        // A word that was not read may have been that of an axis.
+        Some(Reason::UnknownWord) => states_any || slots.mode.is_some() || dialect == Dialect::Heidenhain,
+        Some(Reason::Cycle) => true,
+        _ => states_any,
     }
 }
 
