@@ -92,6 +92,14 @@ enum Verb {
     /// Show recordings, measurements, models and programs in Rerun.
     #[cfg(feature = "visual")]
     View(view::Arguments),
+    /// Show recordings (not in this build).
+    #[cfg(not(feature = "visual"))]
+    #[command(hide = true)]
+    View {
+        /// Whatever was to be shown.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        _files: Vec<String>,
+    },
     /// Print a shell completion script (bash, zsh, fish, elvish, powershell).
     Completions(manual::Completions),
     /// Print the man page, or write the man pages of all verbs.
@@ -107,7 +115,7 @@ pub(crate) fn run() -> ExitCode {
             let code = if error.use_stderr() { 2 } else { 0 };
             if error.use_stderr() {
                 // The message quotes the arguments, which may hold file names from a shell pattern.
-                terminal::print_message_lines(&error.render().to_string());
+                terminal::print_message_lines(&with_decimal_point(error.render().to_string()));
             } else {
                 let _ = error.print();
             }
@@ -123,6 +131,16 @@ pub(crate) fn run() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Says how a number is written, where one has a decimal comma.
+fn with_decimal_point(mut message: String) -> String {
+    let value = message.split_once("invalid value '").and_then(|(_, rest)| rest.split_once('\''));
+    let comma = value.map(|(value, _)| value.replace(',', ".")).filter(|value| value.parse::<f64>().is_ok());
+    if let Some(value) = comma.filter(|_| message.contains("invalid float literal")) {
+        message.push_str(&format!("\n  tip: a number has a decimal point, not a comma: {value}\n"));
+    }
+    message
 }
 
 fn dispatch(verb: Verb) -> anyhow::Result<ExitStatus> {
@@ -146,6 +164,8 @@ fn dispatch(verb: Verb) -> anyhow::Result<ExitStatus> {
         Verb::Export(arguments) => export::run(&arguments),
         #[cfg(feature = "visual")]
         Verb::View(arguments) => view::run(&arguments),
+        #[cfg(not(feature = "visual"))]
+        Verb::View { .. } => Err(anyhow::anyhow!(outputs::NO_RECORDINGS)),
         Verb::Completions(arguments) => manual::completions(&arguments, Cli::command()),
         Verb::Man(arguments) => manual::man(&arguments, Cli::command()),
     }

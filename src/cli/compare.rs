@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     links: UrdfLinks,
     /// Experiment: a name from `--list`, or a TOML file.
-    #[arg(long, required_unless_present = "list")]
+    #[arg(long)]
     experiment: Option<String>,
     /// List the experiments.
     #[arg(long)]
@@ -78,7 +78,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         print_result(format::terminal::document(&view::list(&Experiment::shipped()?), width()))?;
         return Ok(ExitStatus::Done);
     }
-    let name = arguments.experiment.as_deref().unwrap_or_default();
+    let Some(name) = arguments.experiment.as_deref() else {
+        bail!("--experiment is missing: `truegrind compare --list` lists the experiments");
+    };
     let mut inputs: Vec<&Path> = arguments.data.as_deref().into_iter().collect();
     let is_file = name.ends_with(".toml");
     if is_file {

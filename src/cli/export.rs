@@ -116,7 +116,7 @@ fn stated_error(arm: &Estimated) -> String {
         format!("held-out error of these links: {error:.4} mm RMS; they contain the whole model")
     } else {
         format!(
-            "held-out error of these links alone: not evaluated (--data evaluates it); that of the whole model with its effects is \
+            "held-out error of these links alone: not evaluated (`truegrind export` with measurements evaluates it); that of the whole model with its effects is \
              {error:.4} mm RMS"
         )
     }

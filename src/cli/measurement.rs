@@ -44,6 +44,7 @@ enum Reads {
     /// Length of a draw-wire cable.
     Cable,
     /// Position of a reflector or marker.
+    #[value(alias = "tracker")]
     Position,
     /// Position and orientation of a target.
     Pose,

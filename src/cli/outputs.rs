@@ -41,11 +41,14 @@ pub(super) struct Outputs {
     pub(super) rrd: Option<PathBuf>,
 }
 
+/// What a build without pictures answers.
+#[cfg(not(feature = "visual"))]
+pub(super) const NO_RECORDINGS: &str = "this build makes and shows no recordings (it was made with --no-default-features); --html FILE writes a page";
+
 /// A build without pictures refuses `--rrd` instead of ignoring it.
 #[cfg(not(feature = "visual"))]
 fn no_recordings(_: &str) -> Result<PathBuf, String> {
-    Err("this build makes no recordings (it was made with --no-default-features); --html FILE writes a page"
-        .to_owned())
+    Err(NO_RECORDINGS.to_owned())
 }
 
 /// Outputs of a verb without a recording.

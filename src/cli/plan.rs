@@ -34,6 +34,7 @@ enum SensorArgument {
     /// Draw-wire encoder: length.
     Cable,
     /// Tracker with a reflector: position.
+    #[value(alias = "tracker")]
     Position,
     /// Tracker with a 6D target: pose.
     Pose,
@@ -165,7 +166,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let planned = on_threads(arguments.common.threads, || plan(&setup, &options))?
         .map_err(|e| anyhow!("{}: {e}", robot.sheet.name))?;
     drop(work);
-    arguments.outputs.print(&view::summary(&planned, &robot.sheet.name))?;
+    arguments.outputs.print(&view::summary(&planned, &setup, &robot.sheet.name))?;
     let mut batch = Batch::sparing(&inputs_of);
     let name = robot.sheet.name.as_str();
     arguments.outputs.add_made(

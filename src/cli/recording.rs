@@ -17,7 +17,7 @@ use truegrind::calibration::tracking::{Alarm, Tracker};
 use truegrind::compensation::deviation::PathReport;
 use truegrind::pictures::measured::Residuals;
 use truegrind::pictures::{self, LinkMesh, MeasuredScene, PathScene, Recording, Workpiece};
-use truegrind::planning::poses::program::{checked, reading};
+use truegrind::planning::poses::program::{checked, reading, unchecked};
 use truegrind::planning::poses::schedule::FIRST_ROW;
 use truegrind::planning::poses::{MeasurementSetup, Plan};
 use truegrind::report::document::{Block, Document};
@@ -113,10 +113,7 @@ pub(super) fn plan(
     let rough = plan.rows.iter().filter(|row| row.cable_unclear).count();
     let mut answer = vec![
         format!("{} rows at {} poses, in this order", plan.rows.len(), plan.poses.len()),
-        format!(
-            "checked: {}; not checked: the move to the first pose and anything else in the cell",
-            checked(plan)
-        ),
+        format!("checked: {}; not checked: {}", checked(plan), unchecked(plan, setup.sensor)),
     ];
     if rough > 0 {
         answer.push(format!("the cable must be unhooked between poses {rough} times"));

@@ -95,7 +95,23 @@ pub fn load(name: &str) -> Result<Robot, RobotError> {
             return Robot::new(sheet.clone(), file);
         }
     }
-    Err(RobotError::Unknown { name: name.to_owned(), known: catalogue().join(", ") })
+    let similar = similar(name);
+    let near = if similar.is_empty() { String::new() } else { format!(" (similar: {})", similar.join(", ")) };
+    Err(RobotError::Unknown { name: name.to_owned(), near, known: catalogue().join(", ") })
+}
+
+/// The names of the catalogue that contain a name, whatever stands between letters and digits: `irb120`, `UR 10`.
+fn similar(name: &str) -> Vec<String> {
+    let plain = |name: &str| -> String {
+        name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect()
+    };
+    let name = plain(name);
+    let is_similar = |known: &String| {
+        let known_name = plain(known);
+        let without_maker = plain(known.split_once('-').map_or("", |(_, model)| model));
+        known_name.contains(&name) || !without_maker.is_empty() && name.contains(&without_maker)
+    };
+    if name.len() < 2 { Vec::new() } else { catalogue().into_iter().filter(is_similar).collect() }
 }
 
 /// Refuses a nominal arm with a name of the catalogue that is not that arm. Other names are accepted.
@@ -176,7 +192,7 @@ pub fn to_toml(robot: &Robot) -> Result<String, String> {
 
 /// The sheets of a file, as written: keys and types are right, values are not yet checked.
 fn read(text: &str, file: &str) -> Result<RobotFile, RobotError> {
-    toml::from_str(text).map_err(|error| {
+    truegrind_math::toml_text::read(text).map_err(|error| {
         let start = error.span().map_or(0, |span| span.start).min(text.len());
         let before = text.get(..start).unwrap_or_default();
         let line_start = before.rfind('\n').map_or(0, |i| i + 1);

@@ -1,4 +1,4 @@
-//! Mathematical basis: rigid motions, numerical derivatives, statistics, SIMD kernels, parts of sentences, cancellable work.
+//! Mathematical basis: rigid motions, numerical derivatives, statistics, SIMD kernels, parts of sentences, TOML texts, cancellable work.
 
 pub mod lanes;
 pub mod gram;
@@ -7,6 +7,7 @@ pub mod se3;
 pub mod difference;
 pub mod statistics;
 pub mod sentence;
+pub mod toml_text;
 pub mod distribution;
 pub mod tail;
 pub mod radial;

@@ -456,7 +456,7 @@ impl Experiment {
     /// # Errors
     /// [`ExperimentError::Syntax`] and [`ExperimentError::Invalid`].
     pub fn parse(text: &str, file: &str) -> Result<Self, ExperimentError> {
-        let experiment: Self = toml::from_str(text).map_err(|error| {
+        let experiment: Self = truegrind_math::toml_text::read(text).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start).min(text.len());
             let line = text.get(..start).unwrap_or_default().matches('\n').count() + 1;
             ExperimentError::Syntax {

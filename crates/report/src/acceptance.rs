@@ -160,8 +160,8 @@ fn tested(found: &Acceptance) -> String {
     let tested = &found.tested;
     let [x, y, z] = tested.volume_mm;
     let volume = format!(
-        "tested: a volume of {x:.0} × {y:.0} × {z:.0} mm; its poses show {:.1} % of what the poses of the fit show of errors of the \
-         links, placement excluded",
+        "tested: a volume of {x:.0} × {y:.0} × {z:.0} mm; errors of the links show in its poses {:.0} % as much as in those of the \
+         fit, placement excluded",
         100.0 * tested.share
     );
     if tested.is_enough() {
@@ -225,7 +225,7 @@ fn headline(found: &Acceptance) -> (Status, String) {
         ),
         Decision::NotEvaluated => (
             Status::NotEvaluated,
-            format!("Not evaluated: {} poses, at least {FEWEST_POSES} are required", found.poses),
+            format!("{} poses are too few: at least {FEWEST_POSES} are required", found.poses),
         ),
     }
 }
@@ -235,8 +235,7 @@ fn orientation_headline(found: &Acceptance) -> (Status, String) {
     let Some((turns, limit)) =
         found.orientation.as_ref().and_then(|turns| Some((turns, turns.tolerance_rad?)))
     else {
-        let headline =
-            "Not evaluated: a tolerance of the orientation was stated, but the sensor does not measure it";
+        let headline = "A tolerance of the orientation was stated, but the sensor does not measure it";
         return (Status::NotEvaluated, headline.to_owned());
     };
     let [max, limit, u] = [turns.model.max, limit, turns.uncertainty_rad].map(f64::to_degrees);

@@ -23,11 +23,7 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
     let diagnosis = &found.diagnosis;
     let mut page = summary(found);
     page.push(key_figures(found));
-    page.figure(
-        steps(diagnosis),
-        "Held-out error (five random folds, everything refitted in each) from the data sheet to the extended model. All bars have \
-         fitted frames, so the gain of fitting them is not shown. S: data sheet; G: geometry; + 1, + 2: causes in the order of acceptance.",
-    );
+    page.figure(steps(diagnosis), steps_caption(diagnosis));
     page.push(Block::Details {
         summary: "Errors by stage, and statistics of the findings".to_owned(),
         blocks: vec![
@@ -78,13 +74,34 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
     page
 }
 
+/// Names the bars, which stand in the order of the search and not in that of the table.
+fn steps_caption(diagnosis: &Diagnosis) -> String {
+    let causes = diagnosis.steps.iter().enumerate().skip(2);
+    let named: Vec<String> =
+        causes.map(|(index, step)| format!("; {}: {}", step_name(index), step.added)).collect();
+    format!(
+        "Held-out error (five random folds, everything refitted in each) from the data sheet to the extended model, in the order in which \
+         the search took the causes. All bars have fitted frames, so the gain of fitting them is not shown. S: data sheet; G: geometry{}.",
+        named.concat()
+    )
+}
+
 /// What to do about a finding, its picture, and its statistics.
 fn section(page: &mut Document, finding: &Finding, picture: Option<&Picture>) {
-    page.paragraph(format!("{} ({}).", capitalised(&finding.cause), words::confidence(finding)));
+    let (first, if_so) = if finding.members.is_empty() {
+        (capitalised(&finding.cause), "")
+    } else {
+        // The search had to take one of them, not always the likeliest.
+        (answer::in_short(finding), " if that is it")
+    };
+    page.paragraph(format!("{first} ({}).", words::confidence(finding)));
+    if !finding.members.is_empty() {
+        page.paragraph(format!("The fit has it as: {}.", finding.cause));
+    }
     let mut points = doubts(finding);
     let decision = finding.decided_by.as_ref().filter(|decision| **decision != finding.remedy);
     points.extend(decision.map(|decision| format!("what decides: {decision}")));
-    points.push(format!("what to do: {}", finding.remedy));
+    points.push(format!("what to do{if_so}: {}", finding.remedy));
     page.push(Block::List(points));
     if !finding.members.is_empty() {
         page.push(members(finding));

@@ -9,7 +9,7 @@ use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::measurement::dataset::Reading;
 use truegrind_planning::poses::field::FieldUncertainty;
 use truegrind_planning::poses::power::Detectability;
-use truegrind_planning::poses::program::{checked, reading};
+use truegrind_planning::poses::program::{checked, reading, unchecked};
 use truegrind_planning::poses::schedule::{FIRST_ROW, Purpose};
 use truegrind_planning::poses::{MeasurementSetup, Plan};
 
@@ -135,7 +135,7 @@ fn poses(plan: &Plan) -> String {
     }
 }
 
-fn verdict(plan: &Plan) -> Verdict {
+fn verdict(plan: &Plan, setup: &MeasurementSetup<'_>) -> Verdict {
     let minutes = plan.rows.last().map_or(0.0, |row| 60.0 * row.time_h);
     let mut reasons = vec![
         format!(
@@ -176,10 +176,8 @@ fn verdict(plan: &Plan) -> Verdict {
         let tail = if more > 0 { format!(" and {more} more") } else { String::new() };
         reasons.push(format!("not detectable at the usual size: {}{tail}", names.join(", ")));
     }
-    reasons.push(format!(
-        "checked: {}; not checked: the move to the first pose and anything else in the cell",
-        checked(plan)
-    ));
+    reasons.extend(blind_about_last_joint(&undecided, setup));
+    reasons.push(format!("checked: {}; not checked: {}", checked(plan), unchecked(plan, setup.sensor)));
     let rough = plan.rows.iter().filter(|row| row.cable_unclear).count();
     if rough > 0 {
         reasons.insert(
@@ -197,6 +195,21 @@ fn verdict(plan: &Plan) -> Verdict {
     Verdict::new(status, headline, reasons)
 }
 
+/// Says that a target on the axis of joint 6 shows nothing of that joint.
+fn blind_about_last_joint(undecided: &[&Detectability], setup: &MeasurementSetup<'_>) -> Option<String> {
+    let target_mm = setup.frames.flange_from_target.translation.vector;
+    let on_axis = setup.sensor.scalars() <= 3 && target_mm.xy().norm() < ON_AXIS_MM;
+    let of_last = undecided.iter().any(|effect| effect.which.starts_with("joint 6"));
+    (on_axis && of_last).then(|| {
+        "joint 6 turns the target about itself, so that its errors do not show: mount the target beside the axis of joint 6 and state where \
+         (--touched-point 40,0,60)"
+            .to_owned()
+    })
+}
+
+/// Distance from the axis of joint 6 below which a target shows nothing of it (mm).
+const ON_AXIS_MM: f64 = 2.0;
+
 /// Says that the poses tell little about an unexplained error, and how many would tell more.
 fn tells_little(field: &FieldUncertainty, poses: usize) -> Option<String> {
     let (count, left_mm) = field.needed?;
@@ -213,9 +226,9 @@ fn tells_little(field: &FieldUncertainty, poses: usize) -> Option<String> {
 }
 
 /// Summary for the terminal.
-pub fn summary(plan: &Plan, robot: &str) -> Document {
+pub fn summary(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Document {
     let mut page = Document::new(format!("What to measure on {robot}"));
-    page.push(verdict(plan));
+    page.push(verdict(plan, setup));
     if plan.geometry {
         page.push(effect_table(plan));
     }
@@ -225,7 +238,7 @@ pub fn summary(plan: &Plan, robot: &str) -> Document {
 /// The page.
 pub fn document(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Document {
     let mut page = Document::new(format!("What to measure on {robot}"));
-    page.push(verdict(plan));
+    page.push(verdict(plan, setup));
     page.push(key_figures(plan));
     page.paragraph("Obstacles in the cell are unknown to the planner: state them as boxes (--keep-out).");
     if plan.geometry {

@@ -170,7 +170,7 @@ impl SurfaceFile {
             let read = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
             toml_error(file, &read, read.len(), "found a byte that is not UTF-8, expected text")
         })?;
-        let stated: Stated = toml::from_str(text).map_err(|error| {
+        let stated: Stated = truegrind_math::toml_text::read(text).map_err(|error| {
             let at = error.span().map_or(0, |span| span.start);
             toml_error(file, text, at, error.message())
         })?;

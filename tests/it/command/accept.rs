@@ -78,7 +78,7 @@ fn a_model_is_accepted_by_poses_of_its_own() {
         .collect();
     fs::write(at.join("few.csv"), few).unwrap();
     let (code, out, _) = accept("few.csv", &["1"]);
-    assert!(code == 1 && out.contains("[not evaluated] Not evaluated: 60 poses"), "{out}");
+    assert!(code == 1 && out.contains("[not evaluated] 60 poses are too few"), "{out}");
     for (more, expected) in [
         (vec!["0"], "expected a length above 0"),
         (vec!["1", "--sensor-uncertainty", "-1"], "the uncertainty of the sensor"),
@@ -183,7 +183,8 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
         "{out}{err}"
     );
     let (code, out, _) = accept("places.csv", &["--tolerance-angle", "1"]);
-    let headline = "[not evaluated] Not evaluated: a tolerance of the orientation was stated, but the sensor does not measure it";
+    let headline =
+        "[not evaluated] A tolerance of the orientation was stated, but the sensor does not measure it";
     assert!(code == 1 && on_one_line(&out).contains(headline), "{out}");
 }
 

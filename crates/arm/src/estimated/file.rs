@@ -90,7 +90,8 @@ impl Estimated {
     /// # Errors
     /// [`ModelFileError`] says what in the file cannot be used: key, what was found, what was expected.
     pub fn from_toml(text: &str) -> Result<Self, ModelFileError> {
-        let file: ModelFile = toml::from_str(text).map_err(|e| ModelFileError::Syntax(e.to_string()))?;
+        let file: ModelFile =
+            truegrind_math::toml_text::read(text).map_err(|e| ModelFileError::Syntax(e.to_string()))?;
         if file.schema != SCHEMA {
             return Err(ModelFileError::Schema { found: file.schema });
         }

@@ -8,11 +8,13 @@ use thiserror::Error;
 pub enum RobotError {
     /// The name is not in the catalogue.
     #[error(
-        "unknown robot \"{name}\", expected one of {known}; or give the path of a robot file of your own (TOML file, URDF, table of link parameters, UR calibration)"
+        "unknown robot \"{name}\"{near}, expected one of {known}; or give the path of a robot file of your own (TOML file, URDF, table of link parameters, UR calibration)"
     )]
     Unknown {
         /// The requested name.
         name: String,
+        /// " (similar: abb-irb-120)", where there are some.
+        near: String,
         /// The catalogue.
         known: String,
     },

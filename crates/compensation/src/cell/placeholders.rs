@@ -4,14 +4,15 @@
 
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
+use truegrind_math::toml_text::{TomlError, read as read_whole, read_table};
 
 /// The placeholder.
 pub(crate) const MARK: &str = "?";
 
 /// Reads a cell file and lists its placeholders. Without any, the text itself is read, so that errors state their line.
-pub(crate) fn read<T: DeserializeOwned>(text: &str) -> Result<(T, Vec<String>), toml::de::Error> {
+pub(crate) fn read<T: DeserializeOwned>(text: &str) -> Result<(T, Vec<String>), TomlError> {
     if !text.contains("\"?\"") && !text.contains("'?'") {
-        return Ok((toml::from_str(text)?, Vec::new()));
+        return Ok((read_whole(text)?, Vec::new()));
     }
     let mut table: Table = text.parse()?;
     let mut open = Vec::new();
@@ -26,7 +27,7 @@ pub(crate) fn read<T: DeserializeOwned>(text: &str) -> Result<(T, Vec<String>), 
             remove_placeholders(kind, entry, &mut open);
         }
     }
-    Ok((table.try_into()?, open))
+    Ok((read_table(table)?, open))
 }
 
 /// Removes placeholders from one entry; required keys get a value that is never used.

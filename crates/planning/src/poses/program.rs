@@ -74,13 +74,7 @@ pub fn draft(plan: &Plan, setup: &MeasurementSetup<'_>, drive: &ProgramSettings)
                 drive.robot
             ),
             format!("Checked: joint limits, singularities{}; {}.", beside_links(plan, setup), checked(plan)),
-            match setup.sensor {
-                Sensor::Cable => "Not checked: the way to the first pose, and anything else in the cell.".to_owned(),
-                _ => format!(
-                    "Not checked: {}whether the target faces the sensor, the way to the first pose, and anything else in the cell.",
-                    if plan.clearance_mm.is_some() { "" } else { "the line of sight, " }
-                ),
-            },
+            format!("Not checked: {}.", unchecked(plan, setup.sensor)),
             "Run it slowly first. Take one reading at each WaitTime, in this order; rows count as in a spreadsheet with its header."
                 .to_owned(),
         ],
@@ -120,6 +114,18 @@ fn comment(plan: &Plan, setup: &MeasurementSetup<'_>, row: &Row, number: usize) 
         text.push_str("; on the way here the cable leaves its range or nears a link: unhook it");
     }
     text
+}
+
+/// What nobody has checked.
+pub fn unchecked(plan: &Plan, sensor: Sensor) -> String {
+    let seen = match sensor {
+        Sensor::Cable => "",
+        _ if plan.clearance_mm.is_some() => "whether the target faces the sensor, ",
+        _ => {
+            "the line of sight and whether the target faces the sensor (where the sensor stands was not stated: --sensor-frame), "
+        }
+    };
+    format!("{seen}the way to the first pose, and anything else in the cell")
 }
 
 /// Description of the checked obstacles.

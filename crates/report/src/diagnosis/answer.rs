@@ -43,7 +43,7 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
             "the noise floor is unknown, since too few poses were repeated from the same sides".to_owned()
         }
         Some(floor) => format!(
-            "rounding of the log alone accounts for {floor:.3} mm; the noise of the sensor is unknown, since too few poses were \
+            "what is left of the log's rounding accounts for {floor:.3} mm; the noise of the sensor is unknown, since too few poses were \
              repeated from the same sides"
         ),
         None => format!("the noise floor is unknown, since {}", diagnosis.noise_floor_source),

@@ -185,8 +185,9 @@ fn the_headline_says_what_the_noise_floor_is_of() {
     assert!(!fine.contains("0.000 mm"), "{fine}");
     let coarse = headline(0.012, rounding);
     assert!(
-        coarse
-            .contains("rounding of the log alone accounts for 0.012 mm; the noise of the sensor is unknown"),
+        coarse.contains(
+            "what is left of the log's rounding accounts for 0.012 mm; the noise of the sensor is unknown"
+        ),
         "{coarse}"
     );
     let measured = headline(0.012, NoiseFloorSource::Repeats { poses: 20, freedom: 40 });

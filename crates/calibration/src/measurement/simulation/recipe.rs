@@ -392,7 +392,7 @@ pub struct Rounding {
 impl Recipe {
     /// Reads a recipe; `file` is named in errors.
     pub fn parse(text: &str, file: &str) -> Result<Self, RecipeError> {
-        toml::from_str(text).map_err(|error| {
+        truegrind_math::toml_text::read(text).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start).min(text.len());
             let line = text.get(..start).unwrap_or_default().matches('\n').count() + 1;
             RecipeError::Syntax { file: file.into(), line, message: error.message().replace('\n', " ") }
