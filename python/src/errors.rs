@@ -280,7 +280,7 @@ impl From<IdentifyError> for Refusal {
             IdentifyError::TooFewRows { file, poses, needed, .. } => {
                 told.of_file(&file).with(format!("{poses} poses"), format!("{needed} poses"))
             }
-            IdentifyError::WrongArm { file, robot, rmse_mm } => told
+            IdentifyError::WrongArm { file, robot, rmse_mm, .. } => told
                 .of_file(&file)
                 .with(format!("{rmse_mm:.1} mm RMS"), format!("the measurements of {robot}")),
             IdentifyError::WrongOrientation { file, robot, deg } => {

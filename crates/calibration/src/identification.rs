@@ -12,6 +12,7 @@ pub mod solver;
 pub mod fit;
 pub mod start;
 mod sessions;
+pub(crate) mod misreading;
 pub(crate) mod rigid_motion_columns;
 pub mod stated_frame;
 pub mod sensor_laws;

@@ -278,3 +278,60 @@ fn a_payload_above_the_rated_one_is_noted() {
     let (_, _, err) = truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-120"]);
     assert!(err.contains("up to 6.6 kg") && err.contains("rated for 3 kg"), "{err}");
 }
+
+/// What no arm explains is explained by the file, where one mistake does.
+#[test]
+fn a_mistake_that_explains_tracker_readings_is_named() {
+    let text = include_str!("../../data/irb120-tracker.csv");
+    let table: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let written = |table: &[Vec<String>]| table.iter().map(|row| row.join(",") + "\n").collect::<String>();
+    let owned: Vec<Vec<String>> =
+        table.iter().map(|row| row.iter().map(|cell| (*cell).to_owned()).collect()).collect();
+    // Columns that changed places.
+    let mut swapped = owned.clone();
+    swapped[0].swap(6, 7);
+    refused(&written(&swapped), &["mirror image", "measured_x"]);
+    let mut swapped = owned.clone();
+    swapped[0].swap(1, 2);
+    refused(&written(&swapped), &["joints 2 and 3"]);
+    // A reading of row 82 is missing, and all later ones moved up.
+    let mut short = owned.clone();
+    for row in 81..short.len() - 1 {
+        let later = short[row + 1][6..9].to_vec();
+        short[row][6..9].clone_from_slice(&later);
+    }
+    short.pop();
+    refused(&written(&short), &["from row 82 on", "a reading is missing"]);
+    // The tracker was set up elsewhere for the second half.
+    let mut sessions = owned;
+    sessions[0].push("session".to_owned());
+    for (number, row) in sessions.iter_mut().enumerate().skip(1) {
+        let second = number > 100;
+        if second {
+            let x: f64 = row[6].parse().unwrap();
+            let y: f64 = row[7].parse().unwrap();
+            (row[6], row[7]) = (format!("{:.4}", 500.0 - y), format!("{:.4}", x + 200.0));
+        }
+        row.push(if second { "week 2" } else { "week 1" }.to_owned());
+    }
+    refused(&written(&sessions), &["week 1 and week 2", "a file of its own"]);
+}
+
+#[test]
+fn decimal_commas_of_a_cell_file_are_refused_by_line() {
+    let dir = folder();
+    let cell = "[[tool]]\nname = \"tDisc\"\norigin = \"metrology\"\nposition_mm = [12,5, 0, 120]\n";
+    fs::write(dir.path().join("cell.toml"), cell).unwrap();
+    fs::write(dir.path().join("part.mod"), "MODULE part\nENDMODULE\n").unwrap();
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/irb120-tracker.csv");
+    let made = truegrind(dir.path(), &["identify", data, "--robot", "abb-irb-120", "-o", "model.toml"]);
+    assert!(made.0 < 2, "{}", made.2);
+    let (code, _, err) = truegrind(
+        dir.path(),
+        &["compensate", "part.mod", "--model", "model.toml", "--cell", "cell.toml", "-o", "out.mod"],
+    );
+    assert_eq!(code, 2, "{err}");
+    for word in ["cell.toml", "line 4", "position_mm", "found 4 numbers, expected 3", "decimal point"] {
+        assert!(err.contains(word), "`{word}` is not in: {err}");
+    }
+}

@@ -22,6 +22,7 @@ use crate::identification::calibration::Frames;
 use crate::identification::fit::{
     Observations, WRONG_ORIENTATION_RAD, frame_parameters, median_orientation_error,
 };
+use crate::identification::misreading;
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Dataset;
@@ -80,6 +81,7 @@ pub fn diagnose(
             file: dataset.file.clone(),
             robot: robot.to_owned(),
             rmse_mm: typical,
+            explanation: misreading::explanation(dataset, nominal_arm),
         });
     }
     let turned = median_orientation_error(&prepared.observed, &registered.model, &registered.frames);

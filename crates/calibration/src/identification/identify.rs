@@ -14,6 +14,7 @@ use crate::identification::fit::{
 use crate::identification::identifiability::Identifiability;
 use crate::identification::inflation::inflation_from_rows;
 use crate::identification::linearised_readings::widen_by_scale;
+use crate::identification::misreading;
 use crate::identification::prior_width::width_uncertainty;
 use crate::identification::rounding::{
     AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance, rounding_floor_mm,
@@ -105,8 +106,7 @@ pub enum IdentifyError {
     /// The error with fitted frames exceeds any arm's tolerance.
     #[error(
         "{file}: with fitted frames, robot {robot} still differs from the readings by {rmse_mm:.1} mm RMS, more than any arm \
-         differs from its data sheet: check that --robot is the measured arm, that the sensor stayed where it was (each set-up is a file of its own), that no two \
-         columns are swapped, that lengths are in mm and angles in degrees, and try --angles dh"
+         differs from its data sheet{}", misreading::advice(explanation.as_deref())
     )]
     WrongArm {
         /// File.
@@ -115,6 +115,8 @@ pub enum IdentifyError {
         robot: String,
         /// RMS (mm).
         rmse_mm: f64,
+        /// What the readings may be instead, where something explains them.
+        explanation: Option<String>,
     },
     /// The orientations with fitted frames are not those of the arm.
     #[error(
@@ -194,7 +196,10 @@ pub fn identify(
     let wrong_arm = |found| {
         let (file, robot) = (dataset.file.clone(), robot.to_owned());
         match found {
-            WrongArm::Position { rmse_mm } => IdentifyError::WrongArm { file, robot, rmse_mm },
+            WrongArm::Position { rmse_mm } => {
+                let explanation = misreading::explanation(dataset, nominal);
+                IdentifyError::WrongArm { file, robot, rmse_mm, explanation }
+            }
             WrongArm::Orientation { rad } => {
                 IdentifyError::WrongOrientation { file, robot, deg: rad.to_degrees() }
             }

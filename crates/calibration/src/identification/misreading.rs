@@ -1,0 +1,155 @@
+//! Readings that fit no arm: whether they would if two columns were swapped, a reading were missing, or each session had its own set-up.
+//!
+//! Each hypothesis is judged by the closed form for sensor frame and target with the nominal arm, since a wrong file is off by more than any
+//! arm's tolerance. Tracker positions only: a cable's single length fits too much.
+
+use nalgebra::Vector3;
+
+use super::calibration::{CalibrationProblem, Frames, Weight};
+use super::start::candidate_frames;
+use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use truegrind_arm::model::Model;
+use truegrind_math::sentence::listed;
+use truegrind_math::statistics::median;
+
+/// An explanation leaves at most this share of the error.
+const SHARE: f64 = 0.1;
+
+/// Fewest rows to which a frame is fitted.
+const FEWEST: usize = 8;
+
+/// The end of a message that readings are of no arm like this: what explains them, or what to check.
+pub(crate) fn advice(explanation: Option<&str>) -> String {
+    match explanation {
+        Some(explanation) => format!(": {explanation}"),
+        None => ": check that --robot is the measured arm, that the sensor stayed where it was (each set-up is a file of its own), that no two \
+                 columns are swapped, that lengths are in mm and angles in degrees, and try --angles dh"
+            .to_owned(),
+    }
+}
+
+/// What else the readings may be, in a sentence part; `None` where nothing explains them.
+pub(crate) fn explanation(dataset: &Dataset, nominal: &Model) -> Option<String> {
+    if dataset.sensor != Sensor::Position || dataset.rows.len() < 2 * FEWEST {
+        return None;
+    }
+    let case = Case { dataset, nominal, most_mm: SHARE * typical_mm(dataset, nominal)? };
+    case.sessions().or_else(|| case.mirrored()).or_else(|| case.swapped_joints()).or_else(|| case.shifted())
+}
+
+fn fitted_frames(dataset: &Dataset, nominal: &Model) -> Option<Frames> {
+    candidate_frames(dataset, nominal).ok()?.into_iter().next()
+}
+
+/// The size of each row's error.
+fn errors_mm(dataset: &Dataset, nominal: &Model, frames: &Frames) -> Vec<f64> {
+    let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; dataset.rows.len()];
+    CalibrationProblem::new(dataset, nominal, frames, &[], &[], &weights).errors_mm(&[])
+}
+
+/// The median error with fitted frames.
+fn typical_mm(dataset: &Dataset, nominal: &Model) -> Option<f64> {
+    median(&errors_mm(dataset, nominal, &fitted_frames(dataset, nominal)?))
+}
+
+struct Case<'a> {
+    dataset: &'a Dataset,
+    nominal: &'a Model,
+    /// Largest median error of rows that fit (mm).
+    most_mm: f64,
+}
+
+impl Case<'_> {
+    fn fits(&self, dataset: &Dataset) -> bool {
+        typical_mm(dataset, self.nominal).is_some_and(|mm| mm <= self.most_mm)
+    }
+
+    /// Several set-ups in one file, each of which fits by itself.
+    fn sessions(&self) -> Option<String> {
+        let mut names: Vec<&str> = self.dataset.rows.iter().filter_map(|row| row.session()).collect();
+        names.sort_unstable();
+        names.dedup();
+        let fits = |name: &&str| {
+            let rows =
+                (0..self.dataset.rows.len()).filter(|row| self.dataset.rows[*row].session() == Some(*name));
+            let rows: Vec<usize> = rows.collect();
+            rows.len() >= FEWEST && self.fits(&self.dataset.subset(&rows))
+        };
+        (names.len() > 1 && names.iter().all(fits)).then(|| {
+            format!(
+                "each session ({}) fits by itself, but sensor or target moved between them: put each into a file of its own",
+                listed(&names)
+            )
+        })
+    }
+
+    /// A mirror image: no motion of the sensor makes one.
+    fn mirrored(&self) -> Option<String> {
+        let swapped = self.with_readings(|row| {
+            let place = self.dataset.rows[row].reading.place_mm();
+            Some(Vector3::new(place.y, place.x, place.z))
+        });
+        self.fits(&swapped).then(|| {
+            "the readings are a mirror image: two of measured_x, measured_y and measured_z are swapped, or one has the other sign"
+                .to_owned()
+        })
+    }
+
+    fn swapped_joints(&self) -> Option<String> {
+        let pairs = (0..6).flat_map(|a| (a + 1..6).map(move |b| (a, b)));
+        let is_it = |(a, b): &(usize, usize)| {
+            let mut swapped = self.dataset.clone();
+            swapped.rows.iter_mut().for_each(|row| row.joints.swap_rows(*a, *b));
+            self.fits(&swapped)
+        };
+        pairs.into_iter().find(is_it).map(|(a, b)| {
+            format!(
+                "the readings fit if the angles of joints {} and {} change places: their columns are swapped",
+                a + 1,
+                b + 1
+            )
+        })
+    }
+
+    /// From some row on each reading belongs to the row after it, or before it.
+    fn shifted(&self) -> Option<String> {
+        let count = self.dataset.rows.len();
+        [1_isize, -1].into_iter().find_map(|step| {
+            let source = |row: usize| row.checked_add_signed(-step).filter(|other| *other < count);
+            let moved = self.with_readings(|row| Some(self.dataset.rows[source(row)?].reading.place_mm()));
+            let last = moved.rows.len() - moved.rows.len() / 3;
+            let tail = moved.subset(&(last..moved.rows.len()).collect::<Vec<_>>());
+            let frames = fitted_frames(&tail, self.nominal)?;
+            let good = |mm: &f64| *mm <= self.most_mm;
+            let moved_mm = errors_mm(&moved, self.nominal, &frames);
+            if !moved_mm[last..].iter().all(good) {
+                return None;
+            }
+            let begin = moved_mm.iter().rposition(|mm| !good(mm)).map_or(0, |row| row + 1);
+            let first = self.dataset.rows.iter().position(|row| row.number == moved.rows[begin].number)?;
+            // What stands before must fit as it is.
+            let own_mm = errors_mm(self.dataset, self.nominal, &frames);
+            let before = first.saturating_sub(1);
+            let off = own_mm[..before].iter().filter(|mm| !good(mm)).count();
+            let number = self.dataset.rows[source(first)?].number;
+            (off <= before / 10).then(|| {
+                if step > 0 {
+                    format!("from row {number} on each reading belongs to the row after it: a reading is missing there")
+                } else {
+                    format!("from row {number} on each reading belongs to the row before it: there is one reading too many")
+                }
+            })
+        })
+    }
+
+    /// The rows with other readings; those without one are left out.
+    fn with_readings(&self, reading: impl Fn(usize) -> Option<Vector3<f64>>) -> Dataset {
+        let found: Vec<(usize, Vector3<f64>)> =
+            (0..self.dataset.rows.len()).filter_map(|row| Some((row, reading(row)?))).collect();
+        let mut out = self.dataset.subset(&found.iter().map(|(row, _)| *row).collect::<Vec<_>>());
+        for (row, (_, place)) in out.rows.iter_mut().zip(found) {
+            row.reading = Reading::Position(place);
+        }
+        out
+    }
+}
