@@ -72,6 +72,10 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
             "Corrected, but where GripLoad sets the load at run time only the tool is counted: check these motions before running the program",
         ),
         (
+            plan.is_overloaded,
+            "Corrected for a mass far above what the robot is rated for: check it before running the program",
+        ),
+        (
             paths(plan, listing)[2] > 0,
             "Corrected, except for some lines or arcs, where the workpiece deviates as before",
         ),
