@@ -20,8 +20,8 @@ pub(crate) struct Starts<'a> {
     listing: &'a Listing,
     cuts: &'a CutsOf,
     starts: StartsOf<'a>,
-    /// How many motions each cut has, by representative.
-    motions_of_cut: BTreeMap<u32, u32>,
+    /// Representatives of cuts with their motions, sorted.
+    of_cuts: Vec<(u32, u32)>,
     /// Behind which motions another begins that may cut.
     goes_on: Vec<bool>,
     /// Whether a cut remains unmodified as a whole.
@@ -45,16 +45,15 @@ impl<'a> Starts<'a> {
     /// `whole`: a cut is corrected as a whole or not at all.
     pub(crate) fn of(listing: &'a Listing, cuts: &'a CutsOf, whole: bool) -> Self {
         let starts = StartsOf::of(listing);
-        let (mut motions_of_cut, mut goes_on) = (BTreeMap::new(), vec![false; listing.motions.len()]);
-        for (index, motion) in (0_u32..).zip(&listing.motions) {
-            if let Some(root) = cuts.root(index) {
-                *motions_of_cut.entry(root).or_default() += 1;
-            }
-            if may_cut(motion) {
-                starts.each(index, |start| goes_on[start as usize] = true);
-            }
+        let mut goes_on = vec![false; listing.motions.len()];
+        for (index, _) in (0_u32..).zip(&listing.motions).filter(|(_, motion)| may_cut(motion)) {
+            starts.each(index, |start| goes_on[start as usize] = true);
         }
-        Self { listing, cuts, starts, motions_of_cut, goes_on, whole }
+        let motions = 0..listing.motions.len() as u32;
+        let mut of_cuts: Vec<(u32, u32)> =
+            motions.filter_map(|index| Some((cuts.root(index)?, index))).collect();
+        of_cuts.sort_unstable();
+        Self { listing, cuts, starts, of_cuts, goes_on, whole }
     }
 
     /// The motions that must not be corrected because a line or an arc that remains unmodified begins where they end, with what therefore
@@ -139,9 +138,15 @@ impl<'a> Starts<'a> {
         may_cut(motion) && matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
     }
 
+    /// The motions of a cut.
+    fn motions_of(&self, root: u32) -> &[(u32, u32)] {
+        let first = self.of_cuts.partition_point(|(other, _)| *other < root);
+        let count = self.of_cuts[first..].partition_point(|(other, _)| *other == root);
+        &self.of_cuts[first..first + count]
+    }
+
     fn lines_of(&self, root: u32) -> impl Iterator<Item = u32> {
-        let motions = 0..self.listing.motions.len() as u32;
-        motions.filter(move |index| self.cuts.root(*index) == Some(root) && self.is_path(*index))
+        self.motions_of(root).iter().map(|(_, index)| *index).filter(|index| self.is_path(*index))
     }
 
     /// Whether the tool may cut on the way from a start, so that a wedge would show in the part.
@@ -151,7 +156,8 @@ impl<'a> Starts<'a> {
         if is_one_cut || self.draws_back(start, index) {
             return false;
         }
-        let is_alone = |index: u32| self.cuts.root(index).is_some_and(|root| self.motions_of_cut[&root] == 1);
+        let is_alone =
+            |index: u32| self.cuts.root(index).is_some_and(|root| self.motions_of(root).len() == 1);
         let is_approach = self.cuts.root(start).is_none() || is_alone(start) && self.comes_by_air(start);
         is_approach || !is_alone(index) || self.goes_on[index as usize]
     }

@@ -183,18 +183,21 @@ impl Compared<'_> {
         if moved_mm > 0.0 && correction(before, after).norm() == 0.0 {
             return Some(moved_mm);
         }
-        let reached = after.on_the_way.first()?.translation.vector;
         let off = |before: &ExecutedEnd, after: &ExecutedEnd| {
             after.reached.translation.vector - before.commanded.translation.vector
         };
-        let at_end = off(before, after);
-        let start = was
-            .previous
-            .map(|start| start as usize)
-            .and_then(|start| Some(off(self.before[start]?, self.after[self.partners[start]?]?)));
-        let spread_mm = start.map_or(0.0, |at_start| (at_start - at_end).norm());
-        let off_mm = (reached - intended - at_end).norm();
-        (off_mm > FREE_SHARE * spread_mm + FREE_MM).then_some(off_mm)
+        // How much farther off the circle point is than the end.
+        let unlike_end_mm = |end: &ExecutedEnd| {
+            let reached = end.on_the_way.first()?.translation.vector;
+            Some((reached - intended - off(before, end)).norm())
+        };
+        let start = was.previous.map(|start| start as usize);
+        let at_start =
+            start.and_then(|start| Some(off(self.before[start]?, self.after[self.partners[start]?]?)));
+        let spread_mm = at_start.map_or(0.0, |at_start| (at_start - off(before, after)).norm());
+        // An arm whose errors vary over a large circle leaves as much under another model.
+        let bound_mm = FREE_MM + FREE_SHARE * spread_mm + unlike_end_mm(before).unwrap_or(0.0);
+        unlike_end_mm(after).filter(|mm| *mm > bound_mm)
     }
 
     /// How far joint motions that stand for a line lead off it (mm), if farther than a correction leaves.

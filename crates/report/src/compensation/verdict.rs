@@ -190,7 +190,11 @@ fn inserted_reason(plan: &Plan) -> Option<String> {
 /// Lines and arcs on which the tool may cut: how many, how many of them are right or corrected, and how many are uncorrected.
 fn paths(plan: &Plan, listing: &Listing) -> [usize; 3] {
     let mut found = [0; 3];
-    for outcome in &plan.outcomes {
+    // Nothing is cut on a lift from wherever the robot stands.
+    let is_lift = |outcome: &MotionOutcome| {
+        outcome.reason() == Some(OutcomeReason::Program(Reason::CurrentPosition))
+    };
+    for outcome in plan.outcomes.iter().filter(|outcome| !is_lift(outcome)) {
         if is_path(&listing.motions[outcome.motion as usize]) {
             let right = outcome.reason() == Some(OutcomeReason::NoChange);
             found[0] += 1;
