@@ -39,7 +39,7 @@ MODULE Components
     WaitWObj wBelt\RelDist:=100;
     MoveL p,v100,fine,tool2\WObj:=wBelt;
     EGMActPose egm1\Tool:=tool2\WObj:=wobj0,corr,EGM_FRAME_WOBJ,sense,EGM_FRAME_WOBJ\x:=lim\y:=lim;
-    wrapped p,tool2\WObj:=wobj0;
+    wrapped p,tool2\WObj:=wobj0; wrapped p,tool1\WObj:=wobj0;
     MoveL p,v100,fine,tool2;
     ! Nobody knows what these do with what they are given.
     elsewhere pGiven;

@@ -14,6 +14,7 @@ MODULE Doubtful
     MoveL <EXP>,v100,fine,tool0;
     MoveL CRobT(),v100,fine,tool0;
     MoveL Offs(zero2,0,0,ReadNum(dev)),v100,fine,tool0;
+    MoveL Offs(CRobT(\Tool:=tool0\WObj:=wobj0),0,0,20),v100,fine,tool0;
     <SMT>
   ENDPROC
 ENDMODULE

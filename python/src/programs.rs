@@ -616,7 +616,8 @@ impl Run<'_> {
         };
         let acting = ActingArm { nominal: &arm.nominal, model, knowledge, condition: self.condition };
         report_step(&format!("running {name}"));
-        let report = verify(&judged, &acting);
+        let mut report = verify(&judged, &acting);
+        report.differences.extend(original.iter().flat_map(|original| original.text_differences(&task)));
         if report.points.is_empty() {
             let message = format!("{name}: no motion has a target that is known from the text");
             let told = Refusal::new(Kind::Program, message).of_file(&name);

@@ -107,9 +107,9 @@ impl CellArguments {
     /// Notes the loads of a program that are above the rated payload.
     pub(super) fn note_stated_overload(&self, program: &Program<'_>, robot: &str, nominal: &Model) {
         let loads = self.loads(program);
-        if let Some(note) = loads.and_then(|loads| stated_overload(program.listing(), &loads, robot, nominal))
-        {
-            print_message(format_args!("note: {note}"));
+        let stated = loads.and_then(|loads| stated_overload(program.listing(), &loads, robot, nominal));
+        if let Some(stated) = stated {
+            print_message(format_args!("note: {}", stated.note));
         }
     }
 

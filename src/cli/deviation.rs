@@ -334,6 +334,8 @@ impl DeviationContext<'_> {
             cell.note_stated_overload(&task, robot, nominal);
         }
         let loads = [original.as_ref().unwrap_or(&task), &task].map(|program| cell.loads(program));
+        let text_differences =
+            original.as_ref().map_or_else(Vec::new, |original| original.text_differences(&task));
         let reports: Vec<PathReport> = self
             .runners
             .iter()
@@ -354,7 +356,9 @@ impl DeviationContext<'_> {
                     knowledge: runner.knowledge.as_deref(),
                     condition: self.condition,
                 };
-                verify(&judged, &acting)
+                let mut report = verify(&judged, &acting);
+                report.differences.extend(text_differences.iter().cloned());
+                report
             })
             .collect();
         if reports.iter().all(|report| report.points.is_empty()) {

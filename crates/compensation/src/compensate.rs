@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 use crate::cell::Cell;
-use crate::condition::overload::stated_overload;
+use crate::condition::overload::{is_far_above_rating, stated_overload};
 use crate::cut::{Cuts, may_cut};
 use crate::deviation::Status;
 use crate::frames::taught::contradictions;
@@ -184,9 +184,11 @@ fn agreed(
     planned.steps = StepsToLeft::of(program.listing(), &planned.changes, &outcome, options.tolerance_mm);
     planned.notes.extend(undeclared::notes(program.listing(), program.language()));
     let loads = options.loads.as_ref();
-    planned
-        .notes
-        .extend(loads.and_then(|loads| stated_overload(program.listing(), loads, &arm.robot, &arm.nominal)));
+    let stated = loads.and_then(|loads| stated_overload(program.listing(), loads, &arm.robot, &arm.nominal));
+    let most_kg =
+        stated.as_ref().map(|stated| stated.most_kg).into_iter().chain(options.condition.payload_kg);
+    planned.is_overloaded = most_kg.into_iter().any(|kg| is_far_above_rating(kg, &arm.robot));
+    planned.notes.extend(stated.map(|stated| stated.note));
     if program.language() == Language::Rapid
         && let Some(off) = single_precision(&planned.changes)
     {

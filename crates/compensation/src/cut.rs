@@ -71,9 +71,7 @@ pub(crate) fn of(listing: &Listing, treatment: Cuts, part_of: &[u32]) -> CutsOf 
         .map(|(index, motion)| {
             let stands_before = || {
                 let before = index.checked_sub(1)?;
-                let in_text = motions[before].place.file == motion.place.file
-                    && motions[before].routine == motion.routine;
-                in_text.then_some(before as u32)
+                is_in_text(&motions[before], motion).then_some(before as u32)
             };
             let start = motion.previous.or_else(stands_before)?;
             is_one_path(start, index as u32).then_some(start)
@@ -141,6 +139,45 @@ pub(crate) fn starts(listing: &Listing, index: u32) -> Vec<u32> {
     }
 }
 
+/// Where the motions of a program may begin: as [`starts`], across calls and jumps, and where nothing of it is known at the end of the
+/// motion before it in the text of its routine.
+pub(crate) struct StartsOf<'a> {
+    listing: &'a Listing,
+    /// The later and the earlier motion, sorted.
+    across_calls: Vec<[u32; 2]>,
+}
+
+impl<'a> StartsOf<'a> {
+    pub(crate) fn of(listing: &'a Listing) -> Self {
+        let mut across_calls: Vec<[u32; 2]> = listing.across_calls.iter().map(|[a, b]| [*b, *a]).collect();
+        across_calls.sort_unstable();
+        Self { listing, across_calls }
+    }
+
+    pub(crate) fn each(&self, index: u32, mut of: impl FnMut(u32)) {
+        let motion = &self.listing.motions[index as usize];
+        let first = self.across_calls.partition_point(|[later, _]| *later < index);
+        let across = self.across_calls[first..].iter().take_while(|[later, _]| *later == index);
+        let known = self.listing.predecessors.get(&index).filter(|_| motion.previous.is_none());
+        let mut any = false;
+        let earlier = across.map(|[_, earlier]| *earlier).chain(known.into_iter().flatten().copied());
+        for start in earlier.chain(motion.previous) {
+            any = true;
+            of(start);
+        }
+        if let Some(before) = index.checked_sub(1).filter(|_| !any)
+            && is_in_text(&self.listing.motions[before as usize], motion)
+        {
+            of(before);
+        }
+    }
+}
+
+/// Whether two neighbours of a listing stand in one routine.
+fn is_in_text(before: &Motion, motion: &Motion) -> bool {
+    before.place.file == motion.place.file && before.routine == motion.routine
+}
+
 /// Whether the tool may cut during a motion.
 pub(crate) fn may_cut(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
@@ -150,7 +187,14 @@ pub(crate) fn may_cut(motion: &Motion) -> bool {
         // Behind a jump, a call or a label a block without its own G0 or G1 may be either.
         || motion.kind == MotionKind::Unknown && motion.own_reason == Some(Reason::UnknownFlow);
     // A search motion ends, and stops, at its signal.
-    path && motion.own_reason != Some(Reason::Probe) && !motion.instruction.contains("Search")
+    path && motion.own_reason != Some(Reason::Probe)
+        && !motion.instruction.contains("Search")
+        && !follows_position(motion)
+}
+
+/// Whether a motion is counted from where the robot stands: behind a corrected motion it starts at the corrected place and keeps its shape.
+pub(crate) fn follows_position(motion: &Motion) -> bool {
+    motion.to().is_some_and(|to| to.value == Err(Reason::CurrentPosition))
 }
 
 /// Whether the arm stops at the end of a motion.

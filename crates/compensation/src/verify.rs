@@ -97,8 +97,20 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
     });
     let differences =
         after.as_ref().map_or_else(Vec::new, |RewrittenRun { listing, ends: after, partners }| {
-            Compared { original: task.original, rewritten: listing, partners, before: &ends, after }
-                .differences()
+            let configuration = |joints: &Joints| {
+                let found = arms.nominal.configuration(joints);
+                [found.cf1, found.cf4, found.cf6]
+            };
+            let configuration = &configuration;
+            Compared {
+                original: task.original,
+                rewritten: listing,
+                partners,
+                before: &ends,
+                after,
+                configuration,
+            }
+            .differences()
         });
     let points = before.iter().enumerate().map(|(index, first)| {
         checkpoint();
@@ -204,8 +216,9 @@ fn run(
     let condition_indices = condition_indices(listing, loads, &sent, arms, &frame_table);
     let joints: Vec<Joints> = sent.iter().map(|s| s.joints).collect();
     let flanges = arms.conditions.forward(&condition_indices, &joints);
-    let ends =
-        sent.into_iter().zip(flanges).zip(condition_indices).map(|((sent, flange), condition_index)| {
+    let ways = on_the_way(listing, &sent, &condition_indices, arms, &frame_table);
+    let ends = sent.into_iter().zip(flanges).zip(condition_indices).zip(ways).map(
+        |(((sent, flange), condition_index), on_the_way)| {
             let frames = &frame_table.list[sent.frames_index];
             ExecutedEnd {
                 motion: sent.motion,
@@ -216,9 +229,43 @@ fn run(
                 flange_from_tool: frames.real.flange_from_tool(&flange),
                 carried: frames.carried.clone(),
                 condition_index,
+                on_the_way,
             }
-        });
+        },
+    );
     (ends.collect(), without_end)
+}
+
+/// See [`ExecutedEnd::on_the_way`]. The controller moves to joints in proportion from those of the motion before.
+fn on_the_way(
+    listing: &Listing,
+    sent: &[CommandedEnd],
+    condition_indices: &[usize],
+    arms: &Arms<'_>,
+    frame_table: &FrameTable,
+) -> Vec<Vec<Pose>> {
+    let of = |index: usize| {
+        let end = &sent[index];
+        let motion = &listing.motions[end.motion];
+        let frames = &frame_table.list[end.frames_index];
+        let reached = |joints: &Joints| {
+            frames.real.target_of(&arms.conditions.arm(condition_indices[index]).forward(joints))
+        };
+        let before = index.checked_sub(1).map(|before| &sent[before]);
+        match (motion.kind, before) {
+            (MotionKind::Circular, _) => {
+                let via = motion.via().and_then(|via| via.value.ok()?.cartesian().map(|via| via.pose()));
+                let flange = via.map(|via| frames.commanded.flange_for(&via));
+                let joints = flange.and_then(|flange| arms.nominal.solve_near(&flange, &end.joints).ok());
+                joints.iter().map(|solution| reached(&solution.joints)).collect()
+            }
+            (MotionKind::AbsoluteJoint, Some(before)) => {
+                [0.25, 0.5, 0.75].map(|share| reached(&before.joints.lerp(&end.joints, share))).to_vec()
+            }
+            _ => Vec::new(),
+        }
+    };
+    (0..sent.len()).map(of).collect()
 }
 
 /// Condition under which the arm arrives at each end.

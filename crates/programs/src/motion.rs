@@ -518,6 +518,8 @@ pub struct NcFacts {
     /// The first motion of each NC file that could be corrected and whose control neither its words nor a comment show: it is read as plain
     /// ISO 6983.
     pub open_controls: Vec<Place>,
+    /// The first motion with a tool of some length in each LinuxCNC file, if nothing takes the length over (G43): T and M6 alone do not.
+    pub unstated_lengths: Vec<Place>,
     /// Letters of the axes that NC blocks name beside X, Y, Z, A, B and C, and the first of each.
     pub other_axes: BTreeMap<char, Place>,
     /// Motions that call a program outside their file (NC).

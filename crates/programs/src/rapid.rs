@@ -33,6 +33,7 @@ mod payload;
 pub mod task_list;
 mod print;
 mod rewrite;
+pub mod remainder;
 pub mod writer;
 
 pub use task::Task;

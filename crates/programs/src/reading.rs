@@ -4,6 +4,7 @@ use crate::edit::EditError;
 use crate::motion::Listing;
 use crate::motion::load::Loads;
 use crate::nc::setup::Setup;
+use crate::rapid::remainder::TextDifference;
 use crate::rewrite::{Change, RewriteOptions, Rewritten};
 use crate::{nc, rapid};
 
@@ -125,6 +126,23 @@ impl<'s> Program<'s> {
             Program::Rapid(task) => &task.listing,
             Program::Nc(task) => &task.listing,
         }
+    }
+
+    /// What a corrected version has differently from this original outside its motions, in words: no correction changes conditions, data or
+    /// signals. Of NC programs nothing is compared.
+    pub fn text_differences(&self, corrected: &Program<'_>) -> Vec<String> {
+        let (Program::Rapid(original), Program::Rapid(corrected)) = (self, corrected) else {
+            return Vec::new();
+        };
+        let shown = |text: &str| if text.is_empty() { "nothing".to_owned() } else { format!("`{text}`") };
+        let words = |found: TextDifference| {
+            let TextDifference { file, line, here, original } = found;
+            let name = corrected.names.get(file).filter(|_| corrected.names.len() > 1);
+            let place = name.map_or_else(|| format!("line {line}"), |name| format!("{name} line {line}"));
+            let [here, original] = [shown(&here), shown(&original)];
+            format!("{place}: {here} here, {original} in the original, outside any motion")
+        };
+        corrected.text_differences(original).unwrap_or_default().into_iter().map(words).collect()
     }
 
     /// The loads that it states in addition to those of its tools. NC programs state none.

@@ -62,19 +62,25 @@ pub(super) fn refuse_file_for_folder(jobs: &[Job], arguments: &Arguments) -> any
 
 /// Refuses two programs with the same output file.
 pub(super) fn refuse_shared_output(jobs: &[Job]) -> anyhow::Result<()> {
-    let mut taken: HashMap<PathBuf, PathBuf> = HashMap::new();
+    let mut taken: HashMap<PathBuf, (PathBuf, String)> = HashMap::new();
     for job in jobs {
         for path in job.files() {
             let relative = job.relative_output(&path);
             match taken.get(&relative) {
-                Some(first) if *first == path => bail!("{} is named twice", path.display()),
-                Some(first) => bail!(
+                Some((first, other)) if *first == path && *other != job.name() => bail!(
+                    "{} belongs to {other} and to {}: each task would write a corrected version of its own. Correct one task at a time, each into \
+                     its own folder",
+                    path.display(),
+                    job.name()
+                ),
+                Some((first, _)) if *first == path => bail!("{} is named twice", path.display()),
+                Some((first, _)) => bail!(
                     "{} and {} would both be written to {} in the output folder: run them separately, each into its own folder",
                     first.display(),
                     path.display(),
                     relative.display()
                 ),
-                None => taken.insert(relative, path),
+                None => taken.insert(relative, (path, job.name())),
             };
         }
     }

@@ -289,6 +289,18 @@ fn two_programs_never_end_in_one_file() {
     let (code, _, err) = run(&["left/a.mod", "left/a.mod"]);
     assert_eq!(code, 2);
     assert!(err.contains("left/a.mod is named twice"), "{err}");
+    // A module of two tasks.
+    for list in ["left/one.pgf", "left/two.pgf"] {
+        fs::write(at.join(list), "<Program><Module>a.mod</Module></Program>").unwrap();
+    }
+    let (code, _, err) = run(&["left/one.pgf", "left/two.pgf"]);
+    assert_eq!(code, 2);
+    let told = err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        told.contains("left/a.mod belongs to left/one.pgf and to left/two.pgf")
+            && told.contains("one task at a time"),
+        "{err}"
+    );
 }
 
 #[cfg(unix)]

@@ -25,8 +25,25 @@ pub fn overload(kg: f64, robot: &str, rated_kg: f64) -> String {
     format!("{robot} is rated for {rated_kg} kg; check that the mass is right and in kg{likely}")
 }
 
-/// The largest mass that a program states, tools included, with its lines, where it is above the rated payload.
-pub fn stated_overload(listing: &Listing, loads: &Loads, robot: &str, arm: &Model) -> Option<String> {
+/// Masses beyond this share of the rated payload are hardly those of the program and the robot at hand.
+const FAR_ABOVE: f64 = 1.5;
+
+/// Whether a mass is far above the rated payload of a robot.
+pub fn is_far_above_rating(kg: f64, robot: &str) -> bool {
+    rated_payload_kg(robot).is_some_and(|rated_kg| kg > FAR_ABOVE * rated_kg)
+}
+
+/// The largest mass that a program states, tools included, where it is above the rated payload.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StatedOverload {
+    /// That mass.
+    pub most_kg: f64,
+    /// It in words, with its lines.
+    pub note: String,
+}
+
+/// See [`StatedOverload`].
+pub fn stated_overload(listing: &Listing, loads: &Loads, robot: &str, arm: &Model) -> Option<StatedOverload> {
     let rated_kg = rated_payload_kg(robot)?;
     let mass_kg = |index: usize| {
         Some(payload_at(loads, index, &listing.motions[index], listing, arm)?.mass_kg)
@@ -36,9 +53,10 @@ pub fn stated_overload(listing: &Listing, loads: &Loads, robot: &str, arm: &Mode
         (0..listing.motions.len()).filter_map(|index| Some((index as u32, mass_kg(index)?))).collect();
     let most_kg = masses.iter().map(|(_, kg)| *kg).reduce(f64::max)?;
     let motions: Vec<u32> = masses.into_iter().map(|(motion, _)| motion).collect();
-    Some(format!(
-        "payload: up to {most_kg} kg, as stated by the program's tools and loads ({}), and {}",
-        lines_of(listing, &motions)?,
-        overload(most_kg, robot, rated_kg)
-    ))
+    let lines = lines_of(listing, &motions)?;
+    let overload = overload(most_kg, robot, rated_kg);
+    let note = format!(
+        "payload: up to {most_kg} kg, as stated by the program's tools and loads ({lines}), and {overload}"
+    );
+    Some(StatedOverload { most_kg, note })
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::arms::Arms;
 use crate::cut::{self, Cuts, CutsOf};
 use crate::deviation::Status;
-use crate::feasibility::approaches;
+use crate::feasibility::approaches::{Shift, Starts};
 use crate::feasibility::arc_feasibility::infeasible_arcs;
 use crate::feasibility::half_turns::half_turns;
 use crate::feasibility::joint_lines::lines_without_start;
@@ -36,6 +36,9 @@ pub(crate) fn unchanged_motions(
     let mut budget = SearchBudget::of(search_budget::WAYS);
     let mut forbidden = forbid_segments(listing, solved, frame_table, arms, options, None, &mut budget);
     let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
+    // Lines of NC programs have no stops, and their air moves are judged once they are written.
+    let has_starts = !listing.numbered && options.cuts != Cuts::Single;
+    let starts = has_starts.then(|| Starts::of(listing, cuts, options.cuts == Cuts::Whole));
     loop {
         let before = out.len();
         out.extend(infeasible_arcs(listing, solved, frame_table, options, &out));
@@ -52,21 +55,16 @@ pub(crate) fn unchanged_motions(
             Cuts::Partial => cut::steps(listing, cuts, &kept, options.tolerance_mm, &shift_mm),
             Cuts::Single => Vec::new(),
         };
-        // Lines of NC programs have no stops, and their air moves are judged once they are written.
-        let approaches = if listing.numbered || options.cuts == Cuts::Single {
-            Vec::new()
-        } else {
-            approaches::of_cuts_left(listing, cuts, &kept, options.tolerance_mm, &shift_mm)
-        };
         let known_mm = |motion: u32| {
             let end = solved_so_far.of(motion as usize).last().and_then(|to| to.as_ref().ok());
             end.map(SolvedTarget::shift_mm)
         };
-        let from_refused = if listing.numbered || options.cuts == Cuts::Single {
-            Vec::new()
-        } else {
-            approaches::of_starts_refused(listing, &kept, options.tolerance_mm, &known_mm)
-        };
+        let shift = Shift { mm: &known_mm, tolerance_mm: options.tolerance_mm };
+        let of_starts = starts.as_ref().map(|starts| {
+            let left = starts.of_cuts_left(&kept, &shift);
+            (left, starts.of_starts_refused(&kept, &shift))
+        });
+        let (approaches, from_refused) = of_starts.unwrap_or_default();
         out.extend(approaches);
         out.extend(from_refused);
         out.extend(more);

@@ -115,6 +115,7 @@ pub(crate) fn unchecked_notes(
     }
     out.extend(outside_calls_note(listing));
     out.extend(open_control_note(listing));
+    out.extend(unstated_length_note(listing));
     let curve = |m: &u32| {
         let motion = &listing.motions[*m as usize];
         motion.own_reason.is_none()
@@ -155,6 +156,15 @@ fn open_control_note(listing: &Listing) -> Option<String> {
         "nothing says which control the program is for. It was read as ISO 6983: X Y Z are the tool tip, and numbers without a decimal point are \
          mm (from {lines}). A Fanuc reads both differently. State the control in a comment of the program: \
          (truegrind control fanuc), or linuxcnc, siemens, heidenhain, iso"
+    ))
+}
+
+/// LinuxCNC files that change the tool without taking over its length.
+fn unstated_length_note(listing: &Listing) -> Option<String> {
+    let lines = numbered(&listing.files, listing.nc.unstated_lengths.iter().copied())?;
+    Some(format!(
+        "no G43: LinuxCNC does not take over the length of a tool by T and M6, so the tool tip is where the tool is said to have it only if G43 \
+         is still active from before. State G43 behind M6, or G49 where X Y Z are not those of the tip (before {lines})"
     ))
 }
 

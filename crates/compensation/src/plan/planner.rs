@@ -18,6 +18,7 @@ use crate::cell::Cell;
 use crate::configuration::monitored;
 use crate::cut::{self, Cuts, CutsOf};
 use crate::deviation::{PathPoint, Status};
+use crate::feasibility::joint_lines::lines_off_as_joints;
 use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
 use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
@@ -103,6 +104,25 @@ impl<'a> SolvedProgram<'a> {
     /// The plan in which the motions that the writer refused (`refused`, by index) remain unmodified, and with them their
     /// cuts.
     pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
+        let mut refused = refused.clone();
+        // A line that joints do not follow is known only with its inserted targets; refusing it may change what lies behind it.
+        for _ in 0..MOST_LINE_ROUNDS {
+            let plan = self.plan_without(&refused);
+            let off = lines_off_as_joints(self.listing, &plan, self.options);
+            if off.is_empty() {
+                return plan;
+            }
+            refused.extend(off);
+        }
+        let lines =
+            (0_u32..).zip(&self.listing.motions).filter(|(_, motion)| motion.kind == MotionKind::Linear);
+        for (motion, _) in lines {
+            refused.entry(motion).or_insert(OutcomeReason::NoConsistentPlan);
+        }
+        self.plan_without(&refused)
+    }
+
+    fn plan_without(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
         let unchanged = self.unchanged_for(refused);
         let Self { listing, options, arms, frame_table, assessment, solved, .. } = self;
         let measured_sigma_mm = measured_sigma::of(frame_table, solved, arms);
@@ -200,6 +220,9 @@ fn assess(
     let wanted = PlacementChoice { placement: options.placement, max_risk, remedies: options.remedies };
     assess_program(listing, chosen, &at, &mut frame_table.list, &objects, &with, wanted)
 }
+
+/// Largest number of rounds in which lines are refused that joints do not follow.
+const MOST_LINE_ROUNDS: usize = 16;
 
 /// Largest number of rounds in which unmodified motions change the backlash sides of later ones.
 const MOST_UNCHANGED_ROUNDS: usize = 64;

@@ -104,6 +104,11 @@ pub enum OutcomeReason {
     },
     /// Joints were requested, but they would make no line from where it starts.
     LineWithoutStart,
+    /// Joints were requested, but they would leave the line, and no inserted targets keep them on it.
+    LineAsJoints {
+        /// How far they would leave it (mm).
+        mm: f64,
+    },
     /// At the programmed speed a joint would exceed its speed limit.
     TooFast {
         /// Joint, 0-based.
@@ -247,6 +252,10 @@ impl OutcomeReason {
                 "joint targets would not follow this line, since its start is unknown or not corrected: begin with a joint motion, add \
                  --joint-targets, or drop --emit joints"
             }
+            OutcomeReason::LineAsJoints { .. } => {
+                "joint targets would not follow this line, and none can be inserted to keep them on it (\\T, \\Conc, a trigger, SingArea \\Wrist, or \
+                 too many needed): drop --emit joints"
+            }
             OutcomeReason::TooFast { .. } => "a joint exceeds its speed limit at the programmed speed",
             OutcomeReason::NoCircle => "its three points make no circle that follows the intended path",
             OutcomeReason::StartOfUnchangedArc { .. } => {
@@ -308,6 +317,7 @@ impl OutcomeReason {
             }
             OutcomeReason::CorrectionTooLarge { mm }
             | OutcomeReason::PathDeviation { mm }
+            | OutcomeReason::LineAsJoints { mm }
             | OutcomeReason::CornerDeviation { mm }
             | OutcomeReason::AmbiguousCentre { mm }
             | OutcomeReason::Step { mm, .. } => Figure::Length { mm },
@@ -443,6 +453,11 @@ impl fmt::Display for OutcomeReason {
             OutcomeReason::PathDeviation { mm } if mm.is_finite() => {
                 write!(f, "the path to it deviates from the intended one by {mm:.3} mm")
             }
+            OutcomeReason::LineAsJoints { mm } if mm.is_finite() => write!(
+                f,
+                "joint targets would leave this line by {mm:.3} mm, and none can be inserted to keep them on it (\\T, \\Conc, a trigger, \
+                 SingArea \\Wrist, or too many needed): drop --emit joints"
+            ),
             OutcomeReason::CornerDeviation { mm } if mm.is_finite() => write!(
                 f,
                 "the rounded corner before it deviates from the intended one by {mm:.3} mm: round it less (zone, path tolerance)"

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::reason::OutcomeReason;
-use crate::cut::starts;
+use crate::cut::{follows_position, starts};
 use crate::deviation::Status;
 use crate::line_list::lines_of;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason, TargetValue};
@@ -37,6 +37,7 @@ impl StepsToLeft {
             status == Status::Left
                 && reason != Some(OutcomeReason::NoChange)
                 && (is_path(motion) || is_call(motion))
+                && !follows_position(motion)
         };
         let beside_left = |index: usize| {
             let this = &listing.motions[index];

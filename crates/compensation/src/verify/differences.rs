@@ -10,16 +10,20 @@ use nalgebra::Vector3;
 use super::executed_end::ExecutedEnd;
 use crate::line_list::lines_of;
 use crate::segment::curve::Curve;
+use truegrind_arm::model::Joints;
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Frame, Listing, Motion, MotionKind, Tool, WorkObject};
+use truegrind_programs::motion::{
+    Frame, Listing, Modal, Motion, MotionKind, Reason, Switch, Tool, WorkObject,
+};
 
 /// How much farther than its neighbours an inserted target may be off the intended path (mm): a program may be verified with another
 /// model than the one that corrected it.
 const FREE_MM: f64 = 0.2;
 /// The same, per deviation of its neighbours.
 const FREE_SHARE: f64 = 0.5;
-/// How much a circle point may be moved otherwise than the end of its motion, beyond the size of that correction (mm).
-const FREE_CIRCLE_POINT_MM: f64 = 0.5;
+/// The largest turn of a joint by a correction that may bring it into another quarter (rad).
+const CORRECTED_TURN_RAD: f64 = 0.5;
 
 /// Two programs, with the ends of their motions.
 pub(super) struct Compared<'a> {
@@ -29,6 +33,8 @@ pub(super) struct Compared<'a> {
     pub(super) partners: &'a [Option<usize>],
     pub(super) before: &'a [Option<&'a ExecutedEnd>],
     pub(super) after: &'a [Option<&'a ExecutedEnd>],
+    /// The quarters cf1, cf4 and cf6 of joints of the nominal arm.
+    pub(super) configuration: &'a dyn Fn(&Joints) -> [i32; 3],
 }
 
 /// What differs, each with the motions of the rewritten program where it does.
@@ -104,19 +110,109 @@ impl Compared<'_> {
             let what = "the target is unknown or out of reach here, but not in the original";
             found.push(partner, what.to_owned());
         }
-        if let Some(mm) = self.circle_point_moved_mm(index, partner) {
-            found
-                .push(partner, format!("the circle point moved by {mm:.1} mm, unlike the end of the motion"));
+        if let Some(mm) = self.circle_point_off_mm(index, partner) {
+            let what =
+                format!("the circle point is {mm:.1} mm off the circle that the end of the motion fits");
+            found.push(partner, what);
+        }
+        if let Some(mm) = self.joint_way_off_mm(index, partner) {
+            found.push(partner, format!("joint targets that leave the line of the original by {mm:.1} mm"));
+        }
+        // An NC block states few of these itself.
+        if !original.numbered {
+            self.compare_settings(index, partner, found);
         }
     }
 
-    /// Displacement of the circle point (mm), if it differs from that of the end.
-    fn circle_point_moved_mm(&self, index: usize, partner: usize) -> Option<f64> {
+    /// What decides how a motion leads to its target: no correction changes it.
+    fn compare_settings(&self, index: usize, partner: usize, found: &mut Found) {
+        let [original, rewritten] = [self.original, self.rewritten];
+        let [was, is] = [&original.motions[index], &rewritten.motions[partner]];
+        let [had, has] = [original.zone(was), rewritten.zone(is)];
+        if !is_same_value(
+            had.map(|zone| (&zone.text, &zone.value)),
+            has.map(|zone| (&zone.text, &zone.value)),
+        ) {
+            let [has, had] = [has, had].map(|zone| zone.map_or("none", |zone| &zone.text));
+            found.push(partner, format!("zone {has} here, {had} in the original"));
+        }
+        let [had, has] = [original.speed(was), rewritten.speed(is)];
+        let is_same = is_same_value(
+            had.map(|speed| (&speed.text, &speed.value)),
+            has.map(|speed| (&speed.text, &speed.value)),
+        );
+        let lasts = |listing: &Listing, motion: usize| listing.durations_s.get(&(motion as u32)).copied();
+        if !is_same || lasts(original, index) != lasts(rewritten, partner) {
+            let [has, had] = [has, had].map(|speed| speed.map_or("none", |speed| &speed.text));
+            found.push(partner, format!("speed {has} here, {had} in the original (with \\V and \\T)"));
+        }
+        let settings = |motion: &Motion| Modal { displacement: Switch::Off, ..motion.modal };
+        if settings(was) != settings(is) {
+            let what = "ConfL, ConfJ, SingArea, CirPathMode or another setting of the motion differs from the original";
+            found.push(partner, what.to_owned());
+        }
+        if external(was).zip(external(is)).is_some_and(|(had, has)| had != has) {
+            found.push(partner, "the external axes differ from the original".to_owned());
+        }
+        if self.is_another_configuration(index, partner) {
+            found
+                .push(partner, "the configuration (cf1, cf4, cf6, cfx) differs from the original".to_owned());
+        }
+    }
+
+    /// Whether a target states another configuration than the original, and not because the correction turns a joint into the next quarter.
+    fn is_another_configuration(&self, index: usize, partner: usize) -> bool {
+        let stated = |motion: &Motion| Some(motion.to()?.value.ok()?.cartesian()?.conf);
+        let [was, is] = [stated(&self.original.motions[index]), stated(&self.rewritten.motions[partner])];
+        let (Some(was), Some(is)) = (was, is) else { return false };
+        if was == is {
+            return false;
+        }
+        let (Some(before), Some(after)) = (self.before[index], self.after[partner]) else { return true };
+        let is_turned = (after.joints - before.joints).amax() < CORRECTED_TURN_RAD;
+        was[3] != is[3] || !is_turned || (self.configuration)(&after.joints) != is[..3]
+    }
+
+    /// How far the circle point is off where the end of its motion would have it (mm), if by more than a correction leaves.
+    fn circle_point_off_mm(&self, index: usize, partner: usize) -> Option<f64> {
+        let [was, is] = [&self.original.motions[index], &self.rewritten.motions[partner]];
         let via = |motion: &Motion| Some(motion.via()?.value.ok()?.cartesian()?.pose().translation.vector);
-        let [was, is] = [via(&self.original.motions[index])?, via(&self.rewritten.motions[partner])?];
-        let end = correction(self.before[index]?, self.after[partner]?);
-        let moved = is - was;
-        ((moved - end).norm() > end.norm() + FREE_CIRCLE_POINT_MM).then(|| moved.norm())
+        let (intended, stated) = (via(was)?, via(is)?);
+        let (before, after) = (self.before[index]?, self.after[partner]?);
+        let moved_mm = (stated - intended).norm();
+        if moved_mm > 0.0 && correction(before, after).norm() == 0.0 {
+            return Some(moved_mm);
+        }
+        let off = |before: &ExecutedEnd, after: &ExecutedEnd| {
+            after.reached.translation.vector - before.commanded.translation.vector
+        };
+        // How much farther off the circle point is than the end.
+        let unlike_end_mm = |end: &ExecutedEnd| {
+            let reached = end.on_the_way.first()?.translation.vector;
+            Some((reached - intended - off(before, end)).norm())
+        };
+        let start = was.previous.map(|start| start as usize);
+        let at_start =
+            start.and_then(|start| Some(off(self.before[start]?, self.after[self.partners[start]?]?)));
+        let spread_mm = at_start.map_or(0.0, |at_start| (at_start - off(before, after)).norm());
+        // An arm whose errors vary over a large circle leaves as much under another model.
+        let bound_mm = FREE_MM + FREE_SHARE * spread_mm + unlike_end_mm(before).unwrap_or(0.0);
+        unlike_end_mm(after).filter(|mm| *mm > bound_mm)
+    }
+
+    /// How far joint motions that stand for a line lead off it (mm), if farther than a correction leaves.
+    fn joint_way_off_mm(&self, index: usize, partner: usize) -> Option<f64> {
+        let [was, is] = [&self.original.motions[index], &self.rewritten.motions[partner]];
+        if was.kind != MotionKind::Linear || is.kind != MotionKind::AbsoluteJoint {
+            return None;
+        }
+        let first =
+            index.checked_sub(1).and_then(|before| self.partners[before]).map_or(partner, |end| end + 1);
+        let (way, bound_mm) = self.way_of(index)?;
+        let places =
+            (first..=partner).filter_map(|motion| self.after[motion]).flat_map(|end| &end.on_the_way);
+        let off_mm = places.map(|place| distance_mm(&way, place)).fold(0.0, f64::max);
+        (off_mm > bound_mm).then_some(off_mm)
     }
 
     /// Motions that belong to none of the original and are no targets inserted on its path.
@@ -153,20 +249,44 @@ impl Compared<'_> {
         {
             return None;
         }
+        let (way, bound_mm) = self.way_of(index)?;
+        Some((distance_mm(&way, &self.after[added]?.reached), bound_mm))
+    }
+
+    /// The way of an original motion, and how far what a correction writes for it may be off (mm).
+    fn way_of(&self, index: usize) -> Option<(Curve, f64)> {
+        let was = &self.original.motions[index];
         let start_index = was.previous.map(|previous| previous as usize).or(index.checked_sub(1))?;
         let (start, end) = (self.before[start_index]?, self.before[index]?);
         // The start may be stated in another work object.
         let from = end.base_from_object.inverse() * start.base_from_object * start.commanded;
         let way = way(was, from, end.commanded)?;
-        let mm = distance_mm(&way, &self.after[added]?.reached);
         let deviation = |before: &ExecutedEnd, partner: Option<usize>| {
             let reached = self.after[partner?]?.reached.translation.vector;
             Some((reached - before.commanded.translation.vector).norm())
         };
-        let beside =
-            [deviation(start, self.partners[start_index]), deviation(end, Some(partner))].into_iter();
+        let partner = self.partners[index];
+        let beside = [deviation(start, self.partners[start_index]), deviation(end, partner)].into_iter();
         let beside_mm = beside.flatten().fold(0.0, f64::max);
-        Some((mm, (1.0 + FREE_SHARE) * beside_mm + FREE_MM))
+        Some((way, (1.0 + FREE_SHARE) * beside_mm + FREE_MM))
+    }
+}
+
+/// External axes of the end of a motion.
+fn external(motion: &Motion) -> Option<[OptionF64; 6]> {
+    motion.to()?.value.as_ref().ok().map(|value| *value.external())
+}
+
+/// Whether an argument has the same value, or where that is unknown the same words.
+fn is_same_value<T: PartialEq>(
+    a: Option<(&String, &Result<T, Reason>)>,
+    b: Option<(&String, &Result<T, Reason>)>,
+) -> bool {
+    match (a, b) {
+        (Some((_, Ok(a))), Some((_, Ok(b)))) => a == b,
+        (Some((a, _)), Some((b, _))) => a.eq_ignore_ascii_case(b),
+        (None, None) => true,
+        _ => false,
     }
 }
 

@@ -18,6 +18,8 @@ pub(crate) struct ExecutedEnd {
     pub(crate) carried: Option<RegisteredFrame>,
     /// Condition under which the arm arrived.
     pub(crate) condition_index: usize,
+    /// Of a circular motion the circle point as reached, in the work object; of a motion to joints the places at its quarters.
+    pub(crate) on_the_way: Vec<Pose>,
 }
 
 /// The ends of a program by motion; `None` for a motion without one.

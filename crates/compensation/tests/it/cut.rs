@@ -13,7 +13,7 @@ use truegrind_compensation::deviation::Status;
 use truegrind_compensation::options::{Emit, Options};
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::steps_to_left::StepsToLeft;
-use truegrind_programs::motion::Mark;
+use truegrind_programs::motion::{Mark, Reason};
 use truegrind_programs::nc;
 use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup::Setup;
@@ -134,24 +134,25 @@ fn a_cut_extends_into_a_called_routine_and_out_of_it() {
     let [stop, last] = [line(385.0, "fine"), late.replace("z1", "fine")];
     let apart = with_routine(&stop, &last, &line(395.0, "fine"));
     let (apart, _) = self::done(&apart, Cuts::Whole, 0.05);
-    assert_eq!(statuses(&apart), [Changed, Changed, Left]);
-    // The steps at the call and behind it are counted.
-    assert_eq!(apart.plan.steps.unwrap().motions, [0, 1]);
+    // The start of what is left stays with it; the step behind it is counted.
+    assert_eq!(statuses(&apart), [Refused, Changed, Left]);
+    assert_eq!(apart.plan.steps.unwrap().motions, [1]);
     // Corrected on both sides: nothing is refused, and nothing steps.
     let (whole, _) = self::done(&with_routine(&a, &b, &d), Cuts::Whole, 0.05);
     assert_eq!((statuses(&whole), whole.plan.steps), (vec![Changed; 3], None));
 }
 
-/// With a stop at every target each line is a cut of its own: what is left stands beside what is corrected.
+/// With a stop at every target each line is a cut of its own: what leads to the one that is left stays with it, and what is corrected behind
+/// it stands beside it.
 #[test]
 fn steps_beside_what_is_left_are_counted() {
     let late = "MoveL Offs(seen,0,0,0),v20,fine,tool0;\n".to_owned();
     let body =
         [line(380.0, "fine"), line(385.0, "fine"), late, line(390.0, "fine"), line(395.0, "fine")].concat();
     let (done, _) = done(&module(&body), Cuts::Whole, 0.05);
-    assert_eq!(statuses(&done), [Changed, Changed, Left, Changed, Changed]);
+    assert_eq!(statuses(&done), [Refused, Refused, Left, Changed, Changed]);
     let steps = done.plan.steps.unwrap();
-    assert_eq!(steps.motions, [1, 3]);
+    assert_eq!(steps.motions, [3]);
     assert!(steps.largest_mm.is_some_and(|mm| mm > 0.05 && mm < 10.0), "{steps:?}");
     // What an instruction of a module that is not given does there is unknown.
     let elsewhere = "grind [[387,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n".to_owned();
@@ -177,16 +178,77 @@ fn the_approach_to_a_cut_that_is_left_stays_too() {
     // By a line to a stop, and in the order of the file in a loop.
     assert_eq!(statuses(&found(&[&air, &b, &cut]).0), [Refused; 4]);
     assert_eq!(statuses(&found(&["WHILE TRUE DO\n", &air, &b, &cut, "ENDWHILE\n"]).0), [Refused; 4]);
-    // What ends a longer cut belongs to that, and what leads to a corrected one is needed there.
-    assert_eq!(statuses(&found(&[&air, &a, &b, &cut]).0), [Changed, Changed, Changed, Refused, Refused]);
+    // What ends a longer cut takes that with it, and what leads to another cut as well takes that.
+    assert_eq!(statuses(&found(&[&air, &a, &b, &cut]).0), [Refused; 5]);
     let either = [&air, "IF bad THEN\n", &cut, "ELSE\n", &b, "ENDIF\n"].concat();
     let source = module(&either).replace("VAR robtarget", "VAR bool bad;\nVAR robtarget");
-    assert_eq!(statuses(&done(&source, Cuts::Whole, 0.05).0), [Changed, Refused, Refused, Changed]);
+    assert_eq!(statuses(&done(&source, Cuts::Whole, 0.05).0), [Refused; 4]);
     // A correction below the tolerance makes no wedge.
     assert_eq!(
         statuses(&done(&module(&[air, cut].concat()), Cuts::Whole, 5.0).0),
         [Changed, Refused, Refused]
     );
+}
+
+/// Lines lead from cut to cut, and one is left: its start was corrected with the cut of lines before it.
+#[test]
+fn the_start_of_a_cut_that_is_left_stays_whatever_leads_to_it() {
+    let at = |x: f64, z: f64, zone: &str| {
+        format!("MoveL [[{x},0,{z}],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,{zone},tool0;\n")
+    };
+    let late = "MoveL Offs(seen,0,0,0),v20,fine,tool0;\n";
+    let air = at(350.0, 450.0, "fine").replace("MoveL", "MoveJ");
+    let first = [at(350.0, 400.0, "fine"), at(360.0, 400.0, "z1"), at(370.0, 400.0, "fine")].concat();
+    let over = [at(370.0, 450.0, "z10"), at(375.0, 450.0, "z10"), at(375.0, 400.0, "fine")].concat();
+    let left = at(380.0, 400.0, "z1") + late;
+    let away = at(390.0, 450.0, "fine");
+    let found = |body: &[&str]| statuses(&done(&module(&body.concat()), Cuts::Whole, 0.05).0);
+    // The line that draws the tool back from the first cut may be tilted; what it leads to is kept.
+    assert_eq!(
+        found(&[&air, &first, &over, &left, &away]),
+        [Changed, Changed, Changed, Changed, Refused, Refused, Refused, Refused, Left, Changed]
+    );
+    // Without such a line the tool may cut all the way: nothing is corrected.
+    let along = at(375.0, 400.0, "fine");
+    assert_eq!(found(&[&air, &first, &along, &left, &away])[..6], [Refused; 6]);
+    // A single line from the end of a cut to an air move takes the tool away.
+    assert_eq!(found(&[&air, &first, late, &air]), [Changed, Changed, Changed, Changed, Left, Changed]);
+    // Behind a label, and in a routine with an error handler that repeats it.
+    let again = ["n:=0;\nagain:\nn:=n+1;\n", &left, "IF n<3 GOTO again;\n"].concat();
+    let looped =
+        module(&[&air, &first[..], &again].concat()).replace("VAR robtarget", "VAR num n;\nVAR robtarget");
+    let (looped, _) = done(&looped, Cuts::Whole, 0.05);
+    assert!(!looped.changed(), "{:?}", statuses(&looped));
+    // Refused, and what begins at its end.
+    let out = at(900.0, 400.0, "fine");
+    let behind = [at(372.0, 400.0, "z1"), at(380.0, 400.0, "fine")].concat();
+    assert_eq!(found(&[&air, &first, &out, &behind, &air])[..7], [Refused; 7]);
+}
+
+/// A lift from wherever the robot stands keeps its shape behind a corrected motion: it kept cuts from being corrected.
+#[test]
+fn what_is_counted_from_the_robots_position_leaves_cuts_as_they_are() {
+    let [a, b, c] = [(380.0, "z1"), (385.0, "fine"), (390.0, "z10")].map(|(x, zone)| line(x, zone));
+    let air = line(370.0, "fine").replace("MoveL", "MoveJ");
+    let lift = |of: &str| format!("MoveL Offs(CRobT({of}),0,0,ReadNum(dev)),v20,fine,tool0;\n");
+    let own = "\\Tool:=tool0\\WObj:=wobj0";
+    let with = |lift: &str, end: &str| {
+        let routine = [&air, &a, &b, &c, end, "ERROR\n", lift, "RETRY;\n"].concat();
+        with_routine("", &routine, &air)
+    };
+    let (retried, _) = done(&with(&lift(own), ""), Cuts::Whole, 0.05);
+    assert_eq!(statuses(&retried), [Changed, Changed, Changed, Changed, Changed, Left]);
+    assert_eq!(retried.plan.steps, None);
+    assert_eq!(retried.plan.outcomes[5].reason(), Some(OutcomeReason::Program(Reason::CurrentPosition)));
+    // In another tool or work object it leads elsewhere.
+    for other in ["", "\\Tool:=tool0", "\\Tool:=other\\WObj:=wobj0", "\\Tool:=tool0\\WObj:=other"] {
+        let (elsewhere, _) = done(&with(&lift(other), ""), Cuts::Whole, 0.05);
+        assert_ne!(
+            elsewhere.plan.outcomes[5].reason(),
+            Some(OutcomeReason::Program(Reason::CurrentPosition))
+        );
+        assert_ne!(statuses(&elsewhere)[..2], [Changed; 2], "{other}");
+    }
 }
 
 /// The start of a cut was refused and its lines were corrected: the first one became a wedge as high as the correction.
@@ -424,22 +486,29 @@ fn no_random_program_has_a_cut_half_corrected() {
     for seed in 0..60 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut body = String::new();
-        let mut fine = Vec::new();
+        let (mut fine, mut air) = (Vec::new(), Vec::new());
         for k in 0..30 {
             let zone = if random.random_bool(0.2) { "fine" } else { "z1" };
             let x = if random.random_bool(0.08) { 900.0 } else { 360.0 + f64::from(k) };
             fine.push(zone == "fine");
-            body += &if random.random_bool(0.06) {
-                format!("MoveL seen,v20,{zone},tool0;\n")
-            } else {
-                line(x, zone)
+            let late = random.random_bool(0.06);
+            air.push(!late && zone == "fine" && random.random_bool(0.7));
+            body += &match (late, air.last()) {
+                (true, _) => format!("MoveL seen,v20,{zone},tool0;\n"),
+                (false, Some(true)) => line(x, zone).replace("MoveL", "MoveJ"),
+                _ => line(x, zone),
             };
         }
         let (done, _) = done(&module(&body), Cuts::Whole, 0.05);
         let changed: Vec<bool> =
             statuses(&done).iter().map(|s| matches!(s, Changed | Status::Flagged)).collect();
         for k in 1..changed.len() {
-            assert!(fine[k - 1] || changed[k] == changed[k - 1], "seed {seed}, motion {k}: {changed:?}");
+            let apart = fine[k - 1] || air[k];
+            assert!(apart || changed[k] == changed[k - 1], "seed {seed}, motion {k}: {changed:?}");
+            // What stays keeps its start, but for a single line from a stop to an air move.
+            let goes_away = air.get(k + 1).is_none_or(|air| *air);
+            let is_tilted = !air[k] && !changed[k] && changed[k - 1];
+            assert!(!is_tilted || goes_away && !air[k - 1], "seed {seed}, motion {k}: {changed:?}");
         }
         moved += changed.iter().filter(|c| **c).count();
         kept += changed.iter().filter(|c| !**c).count();

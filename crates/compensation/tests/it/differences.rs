@@ -139,8 +139,52 @@ fn a_circle_point_that_moves_otherwise_than_its_motion_is_told() {
     let text = corrected(&plain());
     let line = text.lines().find(|line| line.contains("MoveC")).unwrap();
     let number = line.split("[[").nth(1).unwrap().split(',').next().unwrap();
-    let moved: f64 = number.parse::<f64>().unwrap() + 8.0;
-    let edited = text.replace(line, &line.replacen(number, &moved.to_string(), 1));
-    let found = judged(&program(), &edited).differences;
-    assert!(found.len() == 1 && found[0].contains("the circle point moved by"), "{found:?}");
+    for by_mm in [0.5, 1.5, 8.0] {
+        let moved: f64 = number.parse::<f64>().unwrap() + by_mm;
+        let edited = text.replace(line, &line.replacen(number, &moved.to_string(), 1));
+        let found = judged(&program(), &edited).differences;
+        assert!(found.len() == 1 && found[0].contains("the circle point is"), "{found:?}");
+    }
+}
+
+/// Each was "ok": a zone instead of a stop, another configuration, another setting, an external axis.
+#[test]
+fn what_decides_how_a_motion_leads_to_its_target_is_compared() {
+    let text = corrected(&plain());
+    let last = text.lines().rfind(|line| line.contains("MoveL")).unwrap();
+    let edits = [
+        (text.replace("v100,fine", "v100,z20"), "zone z20 here, fine in the original"),
+        (text.replacen("v100,z1,", "v1000,z1,", 1), "speed v1000 here, v100 in the original"),
+        (text.replace(last, &last.replace(",0],[9E9", ",1],[9E9")), "the configuration"),
+        (text.replace(last, &last.replace(",0,0],[9E9", ",1,0],[9E9")), "the configuration"),
+        (text.replace(last, &last.replace("],[9E9", "],[100")), "the external axes"),
+        (text.replace("PROC main()", "PROC main()\nSingArea\\Wrist;"), "ConfL, ConfJ, SingArea"),
+        (text.replace("PROC main()", "PROC main()\nConfL\\Off;"), "ConfL, ConfJ, SingArea"),
+    ];
+    for (edited, words) in edits {
+        assert_ne!(edited, text, "{words}");
+        let found = judged(&program(), &edited).differences;
+        assert!(found.iter().any(|sentence| sentence.contains(words)), "{words}: {found:?}");
+    }
+}
+
+/// Without one of them the joints between lead off the line.
+#[test]
+fn a_joint_target_that_kept_a_line_and_is_lost_is_told() {
+    let options = Options { emit: Emit::Joints, tolerance_mm: 0.02, ..Options::default() };
+    let long = program().replace("16.0,20.0]", "160.0,20.0]");
+    let known = estimated(perturbed(3, 1.0), &[Joints::zeros()]);
+    let (_, text) = rewritten(long.as_bytes(), &known, &Cell::default(), &options);
+    let text = String::from_utf8(text).unwrap();
+    assert!(judged(&long, &text).differences.is_empty(), "{:?}", judged(&long, &text).differences);
+    let lines: Vec<&str> = text.lines().collect();
+    let first = lines.iter().rposition(|line| line.contains("MoveAbsJ")).unwrap();
+    let kept: Vec<&str> = lines
+        .iter()
+        .enumerate()
+        .filter(|(k, _)| *k < first - 8 || *k >= first)
+        .map(|(_, line)| *line)
+        .collect();
+    let found = judged(&long, &kept.join("\n")).differences;
+    assert!(found.iter().any(|sentence| sentence.contains("leave the line")), "{found:?}\n{text}");
 }

@@ -1,9 +1,13 @@
 //! Payloads that programs state.
 
+use truegrind_compensation::cell::Cell;
+use truegrind_compensation::compensate::compensate;
 use truegrind_compensation::condition::overload::stated_overload;
 use truegrind_compensation::condition::payload::payload_at;
+use truegrind_compensation::options::Options;
 use truegrind_programs::motion::load::{Grip, Load, Loads};
 use truegrind_programs::rapid::Task;
+use truegrind_programs::reading::Program;
 
 const HEAD: &str = "MODULE M\n PERS tooldata t := [TRUE,[[0,0,100],[1,0,0,0]],[2,[0,0,50],[1,0,0,0],0,0,0]];\n \
                     PERS loaddata part := [3,[0,0,20],[1,0,0,0],0,0,0];\n VAR loaddata weighed;\n";
@@ -123,7 +127,7 @@ fn what_a_computed_name_or_an_interrupt_begins_with_is_not_known() {
 fn masses_above_the_rated_payload_are_told_with_the_unit_that_fits() {
     let told = |body: &str, robot: &str| {
         let (task, loads) = grips(body);
-        stated_overload(&task.listing, &loads, robot, &super::nominal())
+        stated_overload(&task.listing, &loads, robot, &super::nominal()).map(|stated| stated.note)
     };
     let both = "PROC main()\n m;\n GripLoad part;\n m;\n GripLoad load0;\n m;\nENDPROC\n";
     let note = told(both, "abb-irb-120").unwrap();
@@ -138,4 +142,21 @@ fn masses_above_the_rated_payload_are_told_with_the_unit_that_fits() {
     let grams = both.replace("GripLoad part", "GripLoad [1500,[0,0,20],[1,0,0,0],0,0,0]");
     let note = told(&grams, "abb-irb-120");
     assert!(note.is_none_or(|note| note.contains("in grams it would be 1.502 kg")));
+}
+
+/// 25 kg on an arm for 3 kg was "ok", with a note.
+#[test]
+fn a_mass_far_above_the_rating_is_a_warning() {
+    let arm = super::estimated(super::perturbed(3, 1.0), &[truegrind_arm::model::Joints::zeros()]);
+    let is_overloaded = |kg: f64, payload_kg: Option<f64>| {
+        let (task, loads) =
+            grips(&format!("PROC main()\n GripLoad [{kg},[0,0,20],[1,0,0,0],0,0,0];\n m;\nENDPROC\n"));
+        let mut options = Options { loads: payload_kg.is_none().then_some(loads), ..Options::default() };
+        options.condition.payload_kg = payload_kg;
+        let program = Program::Rapid(task);
+        compensate(&program, &arm, &Cell::default(), &options, None).unwrap().plan.is_overloaded
+    };
+    // The tool weighs 2 kg.
+    assert_eq!([1.0, 2.0, 23.0].map(|kg| is_overloaded(kg, None)), [false, false, true]);
+    assert_eq!([3.0, 4.0, 25.0].map(|kg| is_overloaded(1.0, Some(kg))), [false, false, true]);
 }

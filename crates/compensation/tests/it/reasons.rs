@@ -51,6 +51,7 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::HalfTurn { .. } => "half a turn",
         // tests/it/joint_lines.rs.
         OutcomeReason::LineWithoutStart => "line without start",
+        OutcomeReason::LineAsJoints { .. } => "line as joints",
         OutcomeReason::TooFast { .. } => "too fast",
         OutcomeReason::NoCircle => "no circle",
         // tests/it/segment.rs.

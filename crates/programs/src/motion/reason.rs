@@ -39,6 +39,7 @@ reasons! {
         Assigned => "assigned while the program runs",
         HandedOver => "passed to a routine outside the given files, which may change it",
         RunTimeFunction => "result of a function known only at run time",
+        CurrentPosition => "counted from where the robot stands (CRobT): it follows the corrected path by itself",
         RunTimeOffset => "offset by a value known only at run time",
         Persistent => "needs persistent data (PERS), of which the controller may hold another value than the file; declare as CONST what never changes",
         RunTimeIndex => "array element chosen at run time",

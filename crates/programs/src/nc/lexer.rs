@@ -85,8 +85,16 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, cr: bool) -> (Token, 
             (Token::Tape, to_line_end(rest, cr))
         }
         b'A'..=b'Z' | b'a'..=b'z' | b'_' | b'$' => word(rest, dialect),
+        // The end of a block on a Fanuc: what stands behind it is another block, and no comment.
+        b';' if dialect == Dialect::Fanuc && !line_begins && !is_comment_or_blank(&rest[1..], cr) => {
+            (Token::Unknown, 1)
+        }
         b';' => (Token::Comment, to_line_end(rest, cr)),
         b'%' if line_begins => (Token::Tape, to_line_end(rest, cr)),
+        // An unclosed comment swallows the next blocks, or stops the control.
+        b'(' if matches!(dialect, Dialect::Fanuc | Dialect::LinuxCnc) && !closes_comment(rest) => {
+            (Token::Unknown, to_line_end(rest, cr))
+        }
         b'(' if dialect.paren_comments() => (Token::Comment, paren_comment(rest)),
         b'"' => (Token::String, quoted(rest, b'"')),
         b'\'' => (Token::String, quoted(rest, b'\'')),
@@ -163,6 +171,17 @@ fn to_line_end(rest: &[u8], cr: bool) -> usize {
     let last = if cr { b'\r' } else { b'\n' };
     let end = rest.iter().position(|&byte| byte == last).unwrap_or(rest.len());
     if end > 1 && rest[end - 1] == b'\r' { end - 1 } else { end }
+}
+
+/// Whether only a comment in parentheses, or nothing, follows on the line.
+fn is_comment_or_blank(rest: &[u8], cr: bool) -> bool {
+    ends_line(rest, cr) || rest.iter().find(|byte| !is_space(**byte)) == Some(&b'(')
+}
+
+/// Whether a comment in parentheses ends on its line.
+fn closes_comment(rest: &[u8]) -> bool {
+    let end = rest.iter().find(|byte| matches!(**byte, b')' | b'\n' | b'\r'));
+    end == Some(&b')')
 }
 
 fn paren_comment(rest: &[u8]) -> usize {

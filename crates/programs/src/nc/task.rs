@@ -129,7 +129,27 @@ impl<'s> Task<'s> {
             motions.find(|motion| motion.reason().is_none()).map(|motion| motion.place)
         };
         task.listing.nc.open_controls = open.filter_map(first).collect();
+        task.listing.nc.unstated_lengths = task.unstated_lengths();
         task
+    }
+
+    /// See [`crate::motion::NcFacts::unstated_lengths`].
+    fn unstated_lengths(&self) -> Vec<Place> {
+        let of_linuxcnc = |file: &usize| self.dialects[*file] == Dialect::LinuxCnc;
+        let mut files = (0..self.trees.len()).filter(of_linuxcnc);
+        if files.any(|file| states_length(&self.trees[file])) {
+            return Vec::new();
+        }
+        let motions = &self.listing.motions;
+        let has_length = |motion: &Motion| {
+            let tool = self.listing.tool(motion).and_then(|tool| tool.value.as_ref().ok());
+            tool.is_some_and(|tool| tool.frame.position_mm != [0.0; 3])
+        };
+        let first = |file: usize| {
+            let mut of_file = motions.iter().filter(|motion| motion.place.file as usize == file);
+            of_file.find(|motion| motion.reason().is_none() && has_length(motion)).map(|motion| motion.place)
+        };
+        (0..self.trees.len()).filter(of_linuxcnc).filter_map(first).collect()
     }
 }
 
@@ -632,4 +652,18 @@ const ORIENTATION: u8 = 7 << 3;
 /// A G code in tenths: 540 for G54, 434 for G43.4.
 fn code(number: f64) -> u32 {
     (number * 10.0).round().clamp(0.0, 1e6) as u32
+}
+
+/// Whether a file takes over or cancels the length of a tool (G43, G43.1, G43.2, G49).
+fn states_length(tree: &NcTree<'_>) -> bool {
+    let mut tokens =
+        (0..tree.len() as u32).filter(|token| tree.kind(*token) != Some(Token::Space)).peekable();
+    while let Some(token) = tokens.next() {
+        let is_g = tree.text(token).eq_ignore_ascii_case(b"g");
+        let code = tokens.peek().filter(|_| is_g).map(|number| tree.text(*number));
+        if code.is_some_and(|code| matches!(code, b"43" | b"43.1" | b"43.2" | b"49")) {
+            return true;
+        }
+    }
+    false
 }

@@ -8,6 +8,7 @@ mod entries;
 mod frames;
 mod literals;
 mod motions;
+mod parameters;
 mod uses;
 
 use std::cell::Cell;
@@ -169,6 +170,8 @@ struct ListingBuilder<'a, 's> {
     outside: Vec<SwitchSet>,
     /// The routines named main.
     mains: Vec<u32>,
+    /// The data that every call hands over for a parameter.
+    handed_over: parameters::HandedOver,
     /// Whether a target expression of the current motion is impure, so that it must not be replaced.
     impure: bool,
     /// Whether the initial value of a declaration is impure.
@@ -228,6 +231,7 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             late: vec![SwitchSet::EMPTY; symbols.units.len()],
             outside: vec![SwitchSet::EMPTY; symbols.units.len()],
             mains: Vec::new(),
+            handed_over: parameters::HandedOver::new(),
             impure: false,
             impure_initials: HashMap::new(),
             literals: Vec::new(),
@@ -269,6 +273,7 @@ impl<'a, 's> ListingBuilder<'a, 's> {
         let units = self.symbols.units.clone();
         let routines = 0..self.symbols.routines.len() as u32;
         self.mains = routines.filter(|&routine| self.symbols.is_main(self.trees, routine)).collect();
+        self.handed_over = parameters::of(self.trees, self.symbols, &self.mains);
         // Exit switches of callees first, however long the chain of calls is.
         for &unit in &self.symbols.callees_first {
             let Some(routine) = units[unit as usize].routine else { continue };

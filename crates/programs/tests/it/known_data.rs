@@ -311,3 +311,47 @@ fn parameters_that_were_assigned_and_numbers_of_routines_are_told() {
     );
     assert_eq!(found, [Ok(0.0), Ok(30.0), Err(Reason::RunTimeOffset), Ok(7.0)]);
 }
+
+/// A routine whose tool and work object are parameters was left whole, even if every call handed over the same.
+#[test]
+fn a_frame_that_every_call_hands_over_is_known() {
+    let frame = "[[1,2,3],[1,0,0,0]]";
+    let data = format!(
+        "PERS wobjdata wA:=[FALSE,TRUE,\"\",{frame},{frame}];\nPERS wobjdata wB:=[FALSE,TRUE,\"\",{frame},{frame}];\n\
+         PERS tooldata t1:=[TRUE,{frame},[1,[0,0,1],[1,0,0,0],0,0,0]];\n"
+    );
+    let go = "MoveL [[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,t\\WObj:=w;\n";
+    let read = |calls: &str, rest: &str| {
+        let part = format!("PROC part(PERS tooldata t,PERS wobjdata w)\n{go}ENDPROC\n");
+        let source = format!("MODULE M\n{data}PROC main()\n{calls}ENDPROC\n{part}{rest}ENDMODULE\n");
+        let listing = Task::read(&[("m.mod", source.as_bytes())]).listing;
+        let motion = listing.motions.last().unwrap().clone();
+        let named = listing.work_object(&motion).map(|object| object.name.clone());
+        (motion.reason(), named.unwrap())
+    };
+    let next = "PROC next(PERS wobjdata v)\npart t1,v;\nENDPROC\n";
+    for (calls, rest) in
+        [("part t1,wA;\n", ""), ("part t1,wA;\npart T1,WA;\n", ""), ("next wA;\npart t1,wA;\n", next)]
+    {
+        assert_eq!(read(calls, rest), (None, "wA".to_owned()), "{calls}{rest}");
+    }
+    // Two values, an expression, a name computed at run time, a routine that writes it, data that are assigned.
+    let write = "PROC other(PERS wobjdata o)\no.uframe.trans.x:=5;\nENDPROC\n";
+    for (calls, rest) in [
+        ("part t1,wA;\npart t1,wB;\n", ""),
+        ("next wA;\npart t1,wB;\n", next),
+        ("part t1,wA;\n%\"pa\"+name% t1,wB;\n", ""),
+        ("part t1,wA;\nother wA;\n", write),
+        ("part t1,wA;\nwA.oframe.trans.z:=4;\n", ""),
+    ] {
+        assert_ne!(read(calls, rest).0, None, "{calls}{rest}");
+    }
+    // Another part of the program, which is not given, may call it as well.
+    let source = format!(
+        "MODULE M\n{data}PROC part(PERS tooldata t,PERS wobjdata w)\n{go}ENDPROC\nPROC cut()\npart t1,wA;\nENDPROC\nENDMODULE\n"
+    );
+    assert_eq!(
+        Task::read(&[("m.mod", source.as_bytes())]).listing.motions[0].reason(),
+        Some(Reason::ToolParameter)
+    );
+}

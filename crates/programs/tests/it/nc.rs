@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use truegrind_programs::motion::{Listing, Mark, MotionKind, Origin, Reason, RobTarget, Role, TargetValue};
+use truegrind_programs::motion::{
+    Frame, Listing, Mark, MotionKind, Origin, Reason, RobTarget, Role, TargetValue,
+};
 use truegrind_programs::nc::dialect::Dialect;
 use truegrind_programs::nc::orientation::{Angles, spun, vector_and_spin};
 use truegrind_programs::nc::parser::parse;
@@ -675,4 +677,43 @@ fn the_mark_stands_behind_that_of_utf_8() {
     let source = "\u{feff}; first\nG1 X1 Y2 Z3\n";
     let task = Task::read(&[("x.mpf", source.as_bytes())], &Setup::default());
     assert_eq!(mark::place(&task.trees[0], Dialect::Siemens), 3);
+}
+
+/// `;` ends a block on a Fanuc: "X5. ; Y7." was read as one block with a comment, and Y7. was left out without a word. An unclosed comment
+/// swallows the blocks behind it.
+#[test]
+fn what_stands_behind_the_end_of_a_block_or_in_an_unclosed_comment_is_unreadable() {
+    let read = |dialect: Dialect, block: &str| {
+        let source = format!("G90 G1 X1. Y2. Z3.\n{block}\nY9.\n");
+        let setup = Setup { dialect: Some(dialect), ..Setup::default() };
+        let listing = Task::read(&[("p.nc", source.as_bytes())], &setup).listing;
+        listing.opaque.first().map(|region| region.place.line)
+    };
+    for block in ["X5. ; Y7.", "X5.;Y7.", "X5. ; D10", "X5. (to the edge"] {
+        assert_eq!(read(Dialect::Fanuc, block), Some(2), "{block}");
+    }
+    for block in ["X5. ;", "X5. ; ", "X5. ; (to the edge)", "; Y7.", "X5. (to the edge)"] {
+        assert_eq!(read(Dialect::Fanuc, block), None, "{block}");
+    }
+    assert_eq!(read(Dialect::LinuxCnc, "X5. ; Y7."), None);
+    assert_eq!(read(Dialect::LinuxCnc, "X5. (to the edge"), Some(2));
+}
+
+/// On LinuxCNC T and M6 alone leave the length of a tool out; it was assumed to be active, and the result was "ok".
+#[test]
+fn a_tool_whose_length_nothing_takes_over_is_told() {
+    let tool = Frame { position_mm: [0.0, 0.0, 120.0], quaternion: [1.0, 0.0, 0.0, 0.0] };
+    let lines = |dialect: Dialect, code: &str| {
+        let mut setup = Setup { dialect: Some(dialect), ..Setup::default() };
+        setup.tools.push(("T1".to_owned(), tool));
+        setup.frames.push(("G54".to_owned(), Frame::IDENTITY));
+        let source = format!("(truegrind angles wpr)\nG90 G21 G54\n{code}G1 X1 Y2 Z3 A180 B0 C0 F600\nX5\n");
+        let listing = Task::read(&[("p.ngc", source.as_bytes())], &setup).listing;
+        listing.nc.unstated_lengths.iter().map(|place| place.line).collect::<Vec<_>>()
+    };
+    assert_eq!(lines(Dialect::LinuxCnc, "T1 M6\n"), [4]);
+    for code in ["T1 M6\nG43\n", "T1 M6\nG43 H1\n", "T1 M6\nG 43.1 Z5\n", "G49\nT1 M6\n", ""] {
+        assert_eq!(lines(Dialect::LinuxCnc, code), [0_u32; 0], "{code}");
+    }
+    assert_eq!(lines(Dialect::Iso, "T1 M6\n"), [0_u32; 0]);
 }

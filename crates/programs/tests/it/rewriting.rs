@@ -1,7 +1,9 @@
 //! Rewriting: new values are written and read back.
 
 use truegrind_programs::motion::{Mark, MotionKind, Reason, TargetValue};
+use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::rapid::Task;
+use truegrind_programs::reading::Program;
 use truegrind_programs::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOptions, Rewritten};
 
 use super::samples::{groups, read};
@@ -425,5 +427,37 @@ fn twenty_thousand_targets_on_one_line_take_linear_time() {
     for (index, motion) in again.listing.motions.iter().enumerate() {
         let x = motion.targets[0].value.unwrap().cartesian().unwrap().position_mm[0];
         assert_eq!(x, (index % 10_000) as f64 + 0.5);
+    }
+}
+
+/// A corrected program differs from its original in its motions and targets alone; a condition turned round was "ok".
+#[test]
+fn what_differs_outside_the_motions_is_told() {
+    let target = "[[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+    let original = format!(
+        "MODULE M\n  CONST robtarget p10:={target};\n  VAR num n;\n  PROC main()\n    n:=3;\n    IF di1=1 THEN\n    MoveL \
+         p10,v100,fine,tool0;\n    ENDIF\n    MoveL Offs(p10,0,0,5),v100,fine,tool0;\n    MoveL CRobT(),v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
+    );
+    let read = |text: &str| Program::read(&[("m.mod", text.to_owned().leak().as_bytes())], &Setup::default());
+    let found = |text: &str| read(&original).text_differences(&read(text));
+    // What a correction does: numbers, a copy of a declaration, a literal, an inserted motion, a mark, other blanks.
+    let moved = target.replace("500", "501");
+    let corrected = original
+        .replace("MODULE M\n", "MODULE M\n! truegrind 1.0.0 model abc\n")
+        .replace(&format!("p10:={target};"), &format!("p10:={target};\n  CONST robtarget p10_2:={moved};"))
+        .replace("MoveL p10", &format!("MoveL {moved},v100,z1,tool0;\n    MoveL p10_2"))
+        .replace("Offs(p10,0,0,5)", &moved)
+        .replace("n:=3", "N := 3");
+    assert_eq!(found(&corrected), Vec::<String>::new());
+    for (from, to, words) in [
+        ("di1=1", "di1=0", "line 8: `IF di1=0 THEN` here, `IF di1=1 THEN` in the original"),
+        ("N := 3", "N := 4", "line 7: `N := 4;` here, `n:=3;` in the original"),
+        ("    ENDIF\n", "    SetDO do1,1;\n    ENDIF\n", "`SetDO do1,1;` here, `ENDIF` in the original"),
+        ("CRobT()", "CRobT(\\Tool:=tool0)", "line 13"),
+        ("  ENDPROC\nENDMODULE\n", "  ENDPROC\n", "line 15: nothing here, `ENDMODULE`"),
+    ] {
+        assert_ne!(corrected.replace(from, to), corrected, "{from}");
+        let found = found(&corrected.replace(from, to));
+        assert!(found.len() == 1 && found[0].contains(words), "{from}: {found:?}");
     }
 }

@@ -64,12 +64,24 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
             "Corrected, but nothing says which control the program is for: state it before running the program",
         ),
         (
+            !listing.nc.unstated_lengths.is_empty(),
+            "Corrected as if the length of the tool were active, but no G43 takes it over: state it before running the program",
+        ),
+        (
+            depends_on_call(plan, listing),
+            "Corrected, but a called program that is not given may change what holds behind its call: give it too, or check these motions",
+        ),
+        (
             !plan.unstated_axes.is_empty(),
             "Corrected as if the robot base never moves: state what the external axes carry before running the program",
         ),
         (
             plan.unknown_loads > 0,
             "Corrected, but where GripLoad sets the load at run time only the tool is counted: check these motions before running the program",
+        ),
+        (
+            plan.is_overloaded,
+            "Corrected for a mass far above what the robot is rated for: check it before running the program",
         ),
         (
             paths(plan, listing)[2] > 0,
@@ -85,6 +97,19 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
         None if is_written => (Status::Good, "All correctable motions are corrected: the program may run"),
         None => (Status::Good, "All correctable motions would be corrected; nothing was written"),
     }
+}
+
+/// Whether a corrected motion stands behind a call of a program that is in none of the files, which may change offsets, tool or units.
+fn depends_on_call(plan: &Plan, listing: &Listing) -> bool {
+    let file = |motion: u32| listing.motions.get(motion as usize).map(|motion| motion.place.file);
+    let is_behind = |call: u32| {
+        let behind = plan.outcomes.iter().filter(|outcome| outcome.motion > call);
+        behind.filter(|outcome| outcome.status.is_written()).any(|outcome| file(outcome.motion) == file(call))
+    };
+    // The first call of each file has the most behind it.
+    let mut files = std::collections::BTreeSet::new();
+    let calls = listing.nc.external_calls.iter().filter(|call| files.insert(file(**call)));
+    calls.copied().any(is_behind)
 }
 
 /// Everything that the headline rests on, the figures first.
@@ -165,7 +190,11 @@ fn inserted_reason(plan: &Plan) -> Option<String> {
 /// Lines and arcs on which the tool may cut: how many, how many of them are right or corrected, and how many are uncorrected.
 fn paths(plan: &Plan, listing: &Listing) -> [usize; 3] {
     let mut found = [0; 3];
-    for outcome in &plan.outcomes {
+    // Nothing is cut on a lift from wherever the robot stands.
+    let is_lift = |outcome: &MotionOutcome| {
+        outcome.reason() == Some(OutcomeReason::Program(Reason::CurrentPosition))
+    };
+    for outcome in plan.outcomes.iter().filter(|outcome| !is_lift(outcome)) {
         if is_path(&listing.motions[outcome.motion as usize]) {
             let right = outcome.reason() == Some(OutcomeReason::NoChange);
             found[0] += 1;

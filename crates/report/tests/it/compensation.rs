@@ -281,6 +281,24 @@ fn verdict_and_page_tell_what_to_look_at() {
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
         assert!(text.contains(sentence), "{text}");
     }
+    let heavy = Plan { is_overloaded: true, ..plan.clone() };
+    let text = terminal::document(&view::summary(&heavy, &listing, &files), 200);
+    assert!(text.contains("[warning] Corrected for a mass far above what the robot is rated for"), "{text}");
+    let mut open = listing.clone();
+    open.nc.unstated_lengths = vec![listing.motions[0].place];
+    let text = terminal::document(&view::summary(&plan, &open, &files), 200);
+    assert!(text.contains("[warning] Corrected as if the length of the tool were active"), "{text}");
+    let last = listing.motions.len() as u32 - 1;
+    for (call, is_depended_on) in [(0, true), (last, false)] {
+        let mut called = listing.clone();
+        called.nc.external_calls = vec![call];
+        let text = terminal::document(&view::summary(&plan, &called, &files), 200);
+        assert_eq!(
+            text.contains("[warning] Corrected, but a called program that is not given"),
+            is_depended_on,
+            "{text}"
+        );
+    }
     for (status, sentence) in [
         (Status::Changed, "[ok] All correctable motions are corrected"),
         (Status::Left, "[not evaluated] Nothing was corrected"),

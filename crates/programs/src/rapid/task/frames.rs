@@ -85,17 +85,35 @@ impl<'s> ListingBuilder<'_, 's> {
         if let Some(index) = self.tools.get(unit.scope, text) {
             return index;
         }
-        let tool = Tool {
-            name: display(text),
-            value: self.evaluated(unit, state, value).tool(),
-            place: self.declared_at(unit, value),
-            assigned: self.varies(unit, value),
+        let tool = match self.handed_over(unit, value) {
+            Some((name, place, value)) => {
+                Tool { name, value: value.tool(), place: Some(place), assigned: false }
+            }
+            None => Tool {
+                name: display(text),
+                value: self.evaluated(unit, state, value).tool(),
+                place: self.declared_at(unit, value),
+                assigned: self.varies(unit, value),
+            },
         };
         let index = intern(&mut self.listing.tools, tool);
         if !self.varies(unit, value) {
             self.tools.put(unit.scope, text, index);
         }
         index
+    }
+
+    /// Name, place and value of the data that every call hands over for a parameter.
+    fn handed_over(&self, unit: Unit, value: Child) -> Option<(String, Place, Value)> {
+        let tree = &self.trees[unit.file as usize];
+        let Child::Token(token) = value else { return None };
+        let parameter = self.symbols.find(unit.scope, tree.text(token))?;
+        let data = *self.handed_over.get(&parameter)?;
+        let symbol = &self.symbols.symbols[data as usize];
+        let name = display(self.trees[symbol.file as usize].text(symbol.name));
+        let known = Known::default();
+        let value = self.evaluator.symbol_value(Context::new(symbol.file, symbol.scope, &known), data);
+        Some((name, self.place(symbol.file, symbol.name), value))
     }
 
     /// The tools that the files declare, whether motions use them or not.
@@ -133,17 +151,23 @@ impl<'s> ListingBuilder<'_, 's> {
         {
             return index;
         }
-        let mut found = match value {
-            Some(value) => self.evaluated(unit, state, value).work_object(),
-            None => built_in(text).ok_or(Reason::Undeclared).and_then(|v| v.work_object()),
+        let handed_over = value.and_then(|value| self.handed_over(unit, value));
+        let mut found = match (&handed_over, value) {
+            (Some((.., value)), _) => value.work_object(),
+            (None, Some(value)) => self.evaluated(unit, state, value).work_object(),
+            (None, None) => built_in(text).ok_or(Reason::Undeclared).and_then(|v| v.work_object()),
         };
         if let (Ok(found), Some(displacement)) = (&mut found, &displacement) {
             found.object_frame = Frame::from_pose(&(found.object_frame.pose() * displacement.pose()));
         }
+        let (name, place) = match handed_over {
+            Some((name, place, _)) => (name, Some(place)),
+            None => (display(text), value.and_then(|value| self.declared_at(unit, value))),
+        };
         let work_object = WorkObject {
-            name: display(text),
+            name,
             value: found,
-            place: value.and_then(|value| self.declared_at(unit, value)),
+            place,
             assigned: value.is_some_and(|value| self.varies(unit, value)),
             displacement,
         };

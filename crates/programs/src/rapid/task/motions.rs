@@ -219,6 +219,10 @@ impl ListingBuilder<'_, '_> {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }
         let complete = to && via && count >= instruction.least();
+        if motion.to().is_some_and(|to| to.value.is_err()) && self.follows_position(unit, node, instruction) {
+            let to = motion.targets.iter_mut().rev().find(|target| target.role == Role::To);
+            to.into_iter().for_each(|to| to.value = Err(Reason::CurrentPosition));
+        }
         motion.own_reason = self.refusal(&motion, instruction, &options, complete);
         // Replacing an impure expression would drop its effect. An unknown target is refused for that reason instead.
         let known = motion.targets.iter().all(|target| target.value.is_ok());
@@ -260,6 +264,53 @@ impl ListingBuilder<'_, '_> {
             let name = tree.text(tree.nodes.first(function));
             self.symbols.routine(unit.scope, name).is_some() || !predefined::is_pure(name)
         })
+    }
+
+    /// Whether the end of a motion is counted from where the robot stands, in the motion's own tool and work object: `CRobT`, perhaps
+    /// with `Offs` or `RelTool`.
+    fn follows_position(&self, unit: Unit, node: u32, instruction: &Instruction) -> bool {
+        let tree = &self.trees[unit.file as usize];
+        let count = arguments(tree, node).filter(|argument| !argument.optional).count();
+        let (mut index, mut to, mut tool, mut work_object) = (0, None, None, None);
+        for argument in arguments(tree, node) {
+            match argument.name.map(|name| tree.text(name)) {
+                Some(name) if argument.optional && same_name(name, b"WObj") => work_object = argument.value,
+                _ if argument.optional => {}
+                name => {
+                    match name.map_or_else(|| instruction.slot(index, count), named_slot) {
+                        Some(Slot::To) => to = argument.value,
+                        Some(Slot::Tool) => tool = argument.value,
+                        _ => {}
+                    }
+                    index += 1;
+                }
+            }
+        }
+        let function = |value: Option<Child>| match value {
+            Some(Child::Node(node)) if tree.nodes.kind(node) == Syntax::Function => {
+                let name = tree.text(tree.nodes.first(node));
+                self.symbols.find(unit.scope, name).is_none().then_some((node, name))
+            }
+            _ => None,
+        };
+        let Some((mut node, mut name)) = function(to) else { return false };
+        if same_name(name, b"Offs") || same_name(name, b"RelTool") {
+            let base = arguments(tree, node).find(|argument| argument.name.is_none());
+            let Some(found) = function(base.and_then(|base| base.value)) else { return false };
+            (node, name) = found;
+        }
+        let option = |wanted: &[u8]| {
+            arguments(tree, node)
+                .find(|argument| argument.name.is_some_and(|name| same_name(tree.text(name), wanted)))
+                .and_then(|argument| argument.value)
+        };
+        let is_same = |stated: Option<Child>, own: Option<Child>, else_named: &[u8]| {
+            let own = own.map_or(else_named, |own| text_of(tree, own));
+            stated.is_some_and(|stated| same_name(text_of(tree, stated), own))
+        };
+        same_name(name, b"CRobT")
+            && is_same(option(b"Tool"), tool, b"")
+            && is_same(option(b"WObj"), work_object, b"wobj0")
     }
 
     /// A call that takes a target but is no motion instruction of the table.
