@@ -235,8 +235,10 @@ pub fn identify(
     };
     report_step("estimating the benefit for programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
-    let beyond_noise = BeyondNoise::of(&trained.geometry, observed.dataset.sensor, repeats.as_ref())
-        .less_rounding(estimated.noise_floor_mm, observed.dataset.sensor);
+    let sensor = observed.dataset.sensor;
+    let beyond_noise =
+        BeyondNoise::of(&trained.geometry, geometry.parameters.len(), sensor, repeats.as_ref())
+            .less_rounding(estimated.noise_floor_mm, sensor);
     estimated.beyond_noise_mm = beyond_noise.known_mm();
     let benefit = variance_inflation.map(|variance_inflation| {
         benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)

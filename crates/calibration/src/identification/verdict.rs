@@ -262,7 +262,7 @@ fn beyond_noise_clause(found: &Benefit) -> String {
     let Some(beyond) = found.beyond_noise else { return String::new() };
     let mut out = match beyond.known_mm() {
         Some(mm) if mm > 0.5 * found.estimated_mm => {
-            format!(", of which {mm:.3} mm come from effects that the model does not contain")
+            format!(", of which {mm:.3} mm are expected from effects that the model does not contain")
         }
         _ => String::new(),
     };
