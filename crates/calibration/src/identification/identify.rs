@@ -182,7 +182,7 @@ pub fn identify(
     let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
     // Before the fits, to limit peak memory.
-    let repeats = noise_floor::noise_floor(&observed.dataset).filter(NoiseFloor::is_known);
+    let repeats = noise_floor::noise_floor_beside_shift(&observed.dataset).filter(NoiseFloor::is_known);
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let (fitted_rows, held_rows) = {
         let Split { train, test } = split(&observed.dataset);
