@@ -7,7 +7,7 @@ use truegrind::arm::model::Model;
 use truegrind::calibration::identification::calibration::Frames;
 use truegrind::calibration::identification::stated_frame::{
     beside, contradicted_target, contradiction, contradiction_beside_geometry, judged_by_fit,
-    with_touched_point,
+    target_contradiction_by_fit, with_touched_point,
 };
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
@@ -69,10 +69,14 @@ impl FramePriorArguments {
         };
         if let Some(touched) = &touched
             && (stated.is_none() || self.touched_sigma.is_some())
-            && let Some(contradiction) =
-                contradicted_target(dataset, nominal, touched, self.touched_sigma.unwrap_or(0.0), &found)
+            && contradicted_target(dataset, nominal, touched, self.touched_sigma.unwrap_or(0.0), &found).is_some()
         {
-            bail!("{contradiction}");
+            // The arm of the data sheet alone refuses nothing.
+            let sigma_mm = self.touched_sigma.unwrap_or(UNSTATED_MM);
+            let judged = target_contradiction_by_fit(of_arm, touched, sigma_mm, &found, (dataset, nominal));
+            if let Some(contradiction) = judged {
+                bail!("{contradiction}");
+            }
         }
         let Some(text) = &self.frame_sigma else {
             if let Some(stated) = stated
@@ -128,7 +132,7 @@ impl FramePriorArguments {
     }
 }
 
-/// Uncertainty of a frame whose own is not stated, to judge it (mm).
+/// Uncertainty of a frame or point whose own is not stated, to judge it (mm).
 const UNSTATED_MM: f64 = 0.5;
 
 /// The target on the flange: where it was touched, turned as the readings say where no rotation was stated; otherwise where they put it.

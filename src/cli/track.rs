@@ -214,7 +214,8 @@ impl TrackContext<'_> {
         self.write(&tracker, fresh, &alarms, &datasets)?;
         let departed = tracker.departure().is_some_and(|departure| departure.is_significant);
         let is_worse = tracker.worse_fit().is_some();
-        Ok(failed || !alarms.is_empty() || departed || is_worse || tracker.mostly_set_aside())
+        let do_not_fit = tracker.mostly_set_aside() || tracker.latest_set_aside().is_some();
+        Ok(failed || !alarms.is_empty() || departed || is_worse || do_not_fit)
     }
 
     /// Processes new files, one after the other.

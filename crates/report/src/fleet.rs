@@ -13,7 +13,7 @@ use super::kept;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_calibration::diagnosis::cause_kind::CauseKind;
-use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis};
+use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, NoiseFloorSource};
 
 /// A cause found for an arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,7 +51,7 @@ pub struct Row {
     /// Held-out error with causes (mm RMSE).
     #[serde(with = "kept::optional")]
     pub extended_mm: Option<f64>,
-    /// Noise of sensor and rounding (mm).
+    /// Scatter of repeated poses (mm); rounding of the log alone is far below what a sensor scatters.
     #[serde(with = "kept::optional")]
     pub noise_floor_mm: Option<f64>,
     /// Causes, in the order of the diagnosis.
@@ -83,7 +83,9 @@ impl Row {
             nominal_mm: Some(fits.nominal.cv_rmse_mm),
             geometric_mm: Some(fits.geometric.cv_rmse_mm),
             extended_mm: Some(fits.extended.cv_rmse_mm),
-            noise_floor_mm: found.noise_floor_mm,
+            noise_floor_mm: found
+                .noise_floor_mm
+                .filter(|_| found.noise_floor_source != NoiseFloorSource::RoundingAlone),
             causes: causes.collect(),
             output,
             note,

@@ -70,6 +70,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         n => format!("{n} changes detected"),
     };
     let processed = format!("{fresh} new poses processed, {changes}");
+    let set_aside = tracker.latest_set_aside();
     let (status, headline) = match (&departure, departed) {
         (_, Some(now)) if !now.is_of_shape => {
             let but = if alarms.is_empty() { ", but" } else { ";" };
@@ -81,6 +82,14 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
                 "{processed}{but} the arm is {:.3} mm from the model that the programs were corrected with: they are not known to \
                  remain valid",
                 now.rms_mm
+            );
+            (Status::Warning, headline)
+        }
+        _ if set_aside.is_some() || tracker.mostly_set_aside() => {
+            let but = if alarms.is_empty() { ", but" } else { ";" };
+            let headline = format!(
+                "{processed}{but} readings no longer agree with the model that the programs were corrected with: they are not known to remain \
+                 valid"
             );
             (Status::Warning, headline)
         }
@@ -106,12 +115,18 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     reasons.extend(departed.and_then(turn_sentence));
     reasons.extend(departed.and_then(|now| last_link_sentence(now, alarms)));
     reasons.extend(which_moved(alarms, departed));
+    reasons.extend(set_aside.map(|[aside, all]| {
+        format!(
+            "{aside} of the latest {all} poses were set aside, since they fit neither the arm nor a detected change: the model written here is \
+             that of the earlier poses"
+        )
+    }));
     let (status, headline) = if tracker.mostly_set_aside() {
         reasons.insert(
             0,
             format!(
                 "{} of {} poses were set aside, since they fit neither the arm nor a detected change: the model follows the others \
-                 only; check the sensor and its target, or start a new track",
+                 only",
                 state.outliers, state.poses
             ),
         );
@@ -119,7 +134,9 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     } else {
         (status, headline)
     };
-    if status == Status::Warning {
+    if set_aside.is_some() || tracker.mostly_set_aside() {
+        reasons.push(DO_NOT_FIT.to_owned());
+    } else if status == Status::Warning {
         reasons.push(
             match departed {
                 Some(now) if !now.is_of_shape && !has_turned(now) => {
@@ -166,6 +183,11 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     ]);
     page.paragraph(format!("Model written: {model}"));
 }
+
+/// What to do where many poses fit neither the arm nor a change of one part.
+const DO_NOT_FIT: &str = "what to do: check the target, the line of sight and that the sensor stands where it stood; put right what moved, and \
+    track new measurements. If nothing did, more than one part of the arm changed, as in a collision: measure 30 poses or more, identify the \
+    arm again, compensate the original programs with the new model, and begin a new track with it (--model, --state)";
 
 /// The last alarm that is not decided.
 fn reported(now: &Departure) -> Option<&Alarm> {

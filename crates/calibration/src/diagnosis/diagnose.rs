@@ -114,7 +114,8 @@ pub fn diagnose(
     let (extended, scatter) = (summary.extended.clone(), summary.joint_scatter.clone());
     let all_causes = &search.stages[2];
     let all_causes = StageErrors { fitted: all_causes.fitted, held_out: all_causes.random };
-    let beyond = BeyondNoise::of(&all_causes, dataset.sensor, summary.repeats.as_ref())
+    let parameters = extended.parameters.len();
+    let beyond = BeyondNoise::of(&all_causes, parameters, dataset.sensor, summary.repeats.as_ref())
         .less_rounding(summary.noise_floor.0, dataset.sensor);
     let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;

@@ -50,7 +50,7 @@ pub(super) fn summarise(
     let context = search.context;
     let (subject, searched, prepared) = (&context.subject, &context.searched, context.prepared);
     let (stages, outcome) = (&search.stages, &confirmed.outcome);
-    let floor = noise_floor::noise_floor(&without_outliers(search)).filter(NoiseFloor::is_known);
+    let floor = noise_floor::noise_floor_beside_shift(&without_outliers(search)).filter(NoiseFloor::is_known);
     let mut steps = vec![
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },

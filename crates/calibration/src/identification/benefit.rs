@@ -32,12 +32,15 @@ use serde::Serialize;
 use self::hypotheses::{Correction, Posterior, alternatives, hypotheses, weighted_posteriors};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::fit::Fitted;
-use crate::identification::linearised_readings::{fits_scale, linearise_readings};
+use crate::identification::linearised_readings::{LinearisedReadings, fits_scale, linearise_readings};
 use crate::identification::sensor_laws::SensorLaw;
 use crate::identification::shape_metric::shape_metric;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::estimated::Estimated;
+
+/// Smallest probability of a benefit at which a model is not doubtful.
+pub const MIN_PROBABILITY: f64 = 0.96;
 
 /// Expected benefit of a model inside its measured region, rigid motions of base and flange excluded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -175,9 +178,34 @@ fn expected_benefit(
     let gradient = &metric * &x;
     let square = x.dot(&gradient);
     let correction = Correction { metric: &metric, x: &x, gradient: &gradient, square, variance_inflation };
-    let alternatives = alternatives(fitted, tolerance, &readings);
-    let hypotheses = hypotheses(fitted, tolerance, &alternatives);
-    let posteriors = weighted_posteriors(&hypotheses, &alternatives, &readings, &correction)?;
+    let judged = |with_objections: bool| {
+        let alternatives = alternatives(fitted, tolerance, &readings, with_objections);
+        let hypotheses = hypotheses(fitted, tolerance, &alternatives);
+        let posteriors = weighted_posteriors(&hypotheses, &alternatives, &readings, &correction)?;
+        averaged(&posteriors, fitted, tolerance, &readings)
+    };
+    let plain = judged(false)?;
+    if !readings.laws.iter().any(|(law, _)| law.is_objection()) {
+        return Some(plain);
+    }
+    let objected = judged(true).filter(|objected| is_raised(objected, &plain));
+    Some(objected.unwrap_or(plain))
+}
+
+/// Whether the further errors that are objections count: where they make doubtful what would not be, or are likelier than not in what is
+/// doubtful anyway. Elsewhere they would only shift the expected errors by what is said of a sensor on the strength of an arm's rest.
+fn is_raised(objected: &Benefit, plain: &Benefit) -> bool {
+    let is_likely = objected.law.is_some_and(|law| law.probability > 0.5);
+    objected.probability < MIN_PROBABILITY && (plain.probability >= MIN_PROBABILITY || is_likely)
+}
+
+/// The benefit under all models together.
+fn averaged(
+    posteriors: &[(f64, Posterior)],
+    fitted: &Fitted,
+    tolerance: &Tolerance,
+    readings: &LinearisedReadings,
+) -> Option<Benefit> {
     let total: f64 = posteriors.iter().map(|(w, _)| w).sum();
     // Absent where there is nothing to average, such as models without a scale error where one is stated.
     let mean = |of: &dyn Fn(&Posterior) -> f64, only: &dyn Fn(&Posterior) -> bool| {
@@ -209,8 +237,9 @@ fn expected_benefit(
         })
     };
     let share_of = |law: SensorLaw| share(&|v| v.law == Some(law));
-    let likeliest =
-        readings.laws.iter().map(|(law, _)| *law).max_by(|a, b| share_of(*a).total_cmp(&share_of(*b)));
+    let likeliest = (readings.laws.iter().map(|(law, _)| *law))
+        .filter(|law| !law.is_objection() || share_of(*law) > 0.0)
+        .max_by(|a, b| share_of(*a).total_cmp(&share_of(*b)));
     let law = likeliest.map(|kind| LawError {
         kind,
         probability: share(&|v| v.law.is_some()),
@@ -232,7 +261,7 @@ fn expected_benefit(
         law,
         readings: readings.count,
         determined: shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum(),
-        parameters: x.len(),
+        parameters: fitted.parameters.len(),
         beyond_noise: None,
     })
 }

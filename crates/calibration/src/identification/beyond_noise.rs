@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::noise_floor::NoiseFloor;
 use truegrind_arm::estimated::StageErrors;
-use truegrind_math::distribution::chi_square_quantile;
+use truegrind_math::statistics::ErrorSummary;
 
 /// Error of a position (mm RMS) that a model leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -25,9 +25,6 @@ pub enum BeyondNoise {
     },
 }
 
-/// Probability with which the noise is below what repeated poses say of it at most.
-const CERTAIN: f64 = 0.99;
-
 /// Error of a model that lacks causes, over that with all of them, from which it lacks something.
 const LACKS: f64 = 1.02;
 
@@ -36,22 +33,31 @@ fn of_position(sensor: Sensor) -> f64 {
     if sensor == Sensor::Cable { 3_f64.sqrt() } else { 1.0 }
 }
 
+/// Mean square error of a row (mm²) from fitted and held-out rows together. Parameters, in rows that would determine them, take up that much
+/// of the fitted rows; more than half of these are not taken off, since priors hold the rest.
+fn mean_square(errors: &StageErrors, parameters: f64) -> f64 {
+    let of = |summary: &ErrorSummary| match summary.count {
+        0 => (0.0, 0.0),
+        count => (count as f64, count as f64 * summary.rmse.powi(2)),
+    };
+    let ((fitted, of_fitted), (held_out, of_held_out)) = (of(&errors.fitted), of(&errors.held_out));
+    (of_fitted + of_held_out) / (fitted - parameters.min(0.5 * fitted) + held_out)
+}
+
 impl BeyondNoise {
-    /// From the errors of a model and the scatter of repeated poses.
+    /// From the errors of a model with so many parameters and the scatter of repeated poses.
     ///
-    /// A cable sees one coordinate of the error, taken as alike in all three. Of few rows the held-out error is large because the
-    /// parameters are uncertain, which is stated elsewhere: the smaller of held-out and fitted error counts.
-    pub fn of(errors: &StageErrors, sensor: Sensor, repeats: Option<&NoiseFloor>) -> Self {
-        let seen_mm = errors.held_out.rmse.min(errors.fitted.rmse);
+    /// A cable sees one coordinate of the error, taken as alike in all three. Without repeated poses the smaller of held-out and fitted error
+    /// counts: of few rows the held-out error is large because the parameters are uncertain, which is stated elsewhere. With them the
+    /// expected excess counts, whether or not chance might explain it: what is not significant of some fifty rows is several times the
+    /// uncertainty of the parameters.
+    pub fn of(errors: &StageErrors, parameters: usize, sensor: Sensor, repeats: Option<&NoiseFloor>) -> Self {
         let of_position = of_position(sensor);
-        let Some(floor) = repeats else { return Self::AtMost(of_position * seen_mm) };
-        let freedom = sensor.axes() * floor.freedom;
-        let noise_mm = floor.sigma_mm * (freedom as f64 / chi_square_quantile(CERTAIN, freedom)).sqrt();
-        Self::Known(if seen_mm > noise_mm {
-            of_position * (seen_mm.powi(2) - floor.sigma_mm.powi(2)).max(0.0).sqrt()
-        } else {
-            0.0
-        })
+        let Some(floor) = repeats else {
+            return Self::AtMost(of_position * errors.held_out.rmse.min(errors.fitted.rmse));
+        };
+        let square = mean_square(errors, parameters as f64 / sensor.axes() as f64);
+        Self::Known(of_position * (square - floor.sigma_mm.powi(2)).max(0.0).sqrt())
     }
 
     /// Beside rounding of the log, which is no error of the arm: its RMS in the readings (mm).

@@ -184,7 +184,7 @@ pub fn identify(
     let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
     // Before the fits, to limit peak memory.
-    let repeats = noise_floor::noise_floor(&observed.dataset).filter(NoiseFloor::is_known);
+    let repeats = noise_floor::noise_floor_beside_shift(&observed.dataset).filter(NoiseFloor::is_known);
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let (fitted_rows, held_rows) = {
         let Split { train, test } = split(&observed.dataset);
@@ -240,8 +240,10 @@ pub fn identify(
     };
     report_step("estimating the benefit for programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
-    let beyond_noise = BeyondNoise::of(&trained.geometry, observed.dataset.sensor, repeats.as_ref())
-        .less_rounding(estimated.noise_floor_mm, observed.dataset.sensor);
+    let sensor = observed.dataset.sensor;
+    let beyond_noise =
+        BeyondNoise::of(&trained.geometry, geometry.parameters.len(), sensor, repeats.as_ref())
+            .less_rounding(estimated.noise_floor_mm, sensor);
     estimated.beyond_noise_mm = beyond_noise.known_mm();
     let benefit = variance_inflation.map(|variance_inflation| {
         benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)

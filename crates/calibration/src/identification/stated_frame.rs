@@ -121,6 +121,61 @@ pub fn contradicted_target(
     })
 }
 
+/// What speaks against the target `touched` on the flange, of standard deviation `sigma_mm`, once geometry is fitted; `None` if nothing does.
+/// Along a smooth path the flange turns as it moves, so that an arm that is off by what any arm is puts the target centimetres elsewhere:
+/// with S the covariance of the target that geometry leaves and P that of the stated one, χ² = Δᵀ (S + P)⁻¹ Δ. A point that is right leaves
+/// nearly as little as a free one. Without a fit nothing is judged: that of the readings says why.
+pub fn target_contradiction_by_fit(
+    of_arm: &Tolerance,
+    touched: &Pose,
+    sigma_mm: f64,
+    found: &Frames,
+    (dataset, nominal): (&Dataset, &Model),
+) -> Option<String> {
+    let mut free = fitted_beside(found, *of_arm, (dataset, nominal))?;
+    let stated = with_touched_point(dataset, nominal, touched, found.clone());
+    let with = fitted_beside(&stated, Tolerance { target_mm: sigma_mm, ..*of_arm }, (dataset, nominal));
+    if of_arm.scale.is_none() {
+        widen_by_scale(&mut free, dataset, WIDEST_SCALE);
+    }
+    let own: Vec<usize> = (0..free.parameters.len())
+        .filter(|&k| matches!(free.parameters[k], Parameter::Target(0..3)))
+        .collect();
+    let covariance = free.estimate.covariance.as_ref()?;
+    let of_fit = covariance.select_rows(&own).select_columns(&own);
+    let of_stated = DMatrix::identity(own.len(), own.len()) * sigma_mm.powi(2);
+    let at = free.frames.flange_from_target.translation.vector;
+    let away = touched.translation.vector - at;
+    let difference = DVector::from_column_slice(&away.as_slice()[..own.len()]);
+    let weighted = (of_fit + &of_stated).cholesky()?.solve(&difference);
+    let square = difference.dot(&weighted);
+    let off_mm = (of_stated * weighted).norm();
+    let is_off = square > CONTRADICTS && off_mm > OF_FIT * typical_error_mm(&free, dataset);
+    let leaves_more = with.is_none_or(|with| with.sigma_mm > OF_FIT * free.sigma_mm.max(ANY_NOISE_MM));
+    (is_off || leaves_more).then(|| {
+        format!(
+            "--touched-point: with the arm's geometry fitted the readings put the target {:.1} mm from there, at {:.1},{:.1},{:.1} on the \
+             flange, which contradicts it by {:.0} standard deviations: check that it is in mm in the flange frame, and of this set-up",
+            away.norm(),
+            at.x,
+            at.y,
+            at.z,
+            square.sqrt()
+        )
+    })
+}
+
+/// Geometry fitted from `frames` with the priors `tolerance`.
+fn fitted_beside(
+    frames: &Frames,
+    tolerance: Tolerance,
+    (dataset, nominal): (&Dataset, &Model),
+) -> Option<Fitted> {
+    let options = Options { tolerance, ..Options::default() };
+    let split = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
+    identify(dataset, "", nominal, frames, &split, &options).ok().map(|found| found.geometry)
+}
+
 /// What speaks against the stated frame, whose standard deviation is `sigma_mm`, beside the frame `found` from the readings of the arm
 /// `nominal`; `None` if nothing does. A cable's outlet is not judged: lengths determine it much less.
 pub fn contradiction(
@@ -229,11 +284,7 @@ pub fn judged_by_fit(
 ) -> (Option<Option<String>>, Option<Fitted>) {
     let of_arm = Tolerance { target_mm: tolerance.target_mm, ..*of_arm };
     let of_arm = tolerance_beside(dataset, nominal, &of_arm);
-    let fit = |frames: &Frames, tolerance: Tolerance| {
-        let options = Options { tolerance, ..Options::default() };
-        let split = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
-        identify(dataset, "", nominal, frames, &split, &options).ok().map(|found| found.geometry)
-    };
+    let fit = |frames: &Frames, tolerance: Tolerance| fitted_beside(frames, tolerance, (dataset, nominal));
     let Some(free) = fit(found, of_arm) else { return (None, None) };
     let with = fit(stated, Tolerance { frame_mm: sigma[0], frame_rad: sigma[1], ..of_arm });
     (Some(contradiction_by_fit(dataset, &free, with.as_ref())), Some(free))

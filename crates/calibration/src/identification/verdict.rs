@@ -5,16 +5,13 @@
 //! explains the readings as well as the links, or there are too few rows for their noise. A doubtful model is written only on
 //! request, and every use of it says so.
 
-use crate::identification::benefit::{Benefit, LawError, NoBenefit, ScaleError};
+use crate::identification::benefit::{Benefit, LawError, MIN_PROBABILITY, NoBenefit, ScaleError};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::sensor_laws::SensorLaw;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Sensor;
 use truegrind_arm::estimated::{EstimatedParameter, Judgement, Verdict};
 use truegrind_math::statistics::ErrorSummary;
-
-/// Smallest probability of a benefit at which a model is not doubtful.
-pub const MIN_PROBABILITY: f64 = 0.96;
 
 /// Probability from which a scale error of the sensor counts as detected.
 const FOUND: f64 = 0.95;
@@ -265,7 +262,7 @@ fn beyond_noise_clause(found: &Benefit) -> String {
     let Some(beyond) = found.beyond_noise else { return String::new() };
     let mut out = match beyond.known_mm() {
         Some(mm) if mm > 0.5 * found.estimated_mm => {
-            format!(", of which {mm:.3} mm come from effects that the model does not contain")
+            format!(", of which {mm:.3} mm are expected from effects that the model does not contain")
         }
         _ => String::new(),
     };
@@ -312,6 +309,11 @@ fn law_sentence(law: &LawError) -> String {
             "a cable whose length is wound on in layers",
             "measure poses at more directions of the cable for each of its lengths (random poses over the full ranges of the joints), \
              and the sensor itself against a known length",
+        ),
+        SensorLaw::Lens => (
+            "a sensor whose scale changes over its field, as that of a camera whose lens distorts,",
+            "measure a known length (a scale bar) in the middle and at the edges of the field, calibrate the camera anew, and measure poses \
+             with the flange turned as far as it can be seen at each place; with readings that are true over the whole field, identify again",
         ),
     };
     let explains = if law.probability > FOUND {

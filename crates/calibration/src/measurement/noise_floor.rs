@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::dataset::{Dataset, Reading, Row};
+use super::dataset::{Dataset, Reading, Row, Sensor};
 use super::repeated_poses::with_poses;
 
 /// Scatter of repeated poses.
@@ -45,6 +45,80 @@ impl NoiseFloor {
 /// ```
 pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
     pooled_scatter_by(data, |row, _| Some(row.reading.place_mm()))
+}
+
+/// The noise floor where sensor or target may have shifted between the repetitions of a pose.
+///
+/// A shift is no noise: it moves all readings after it alike. Where the repetitions before and after some row differ by a common vector that
+/// is most of their differences, and the scatter on either side of it is less than half of the whole, those of either side count alone.
+pub fn noise_floor_beside_shift(data: &Dataset) -> Option<NoiseFloor> {
+    let whole = noise_floor(data)?;
+    // A length changes by another amount in each direction of the cable.
+    let sees_vectors = data.sensor != Sensor::Cable;
+    if !sees_vectors || !whole.is_known() {
+        return Some(whole);
+    }
+    let are_copied = repeats_of_readings(data).are_copied();
+    let groups = readings_of_poses(data);
+    let count = data.rows.len();
+    let step = count.div_ceil(MOST_CUTS).max(1);
+    let floors = (step..count).step_by(step).filter_map(|cut| floor_on_either_side(&groups, are_copied, cut));
+    let best = floors.filter(|floor| 2.0 * floor.sigma_mm < whole.sigma_mm);
+    // Of few repetitions that are left the scatter may be small by chance.
+    let at_most_mm = |floor: &NoiseFloor| floor.sigma_mm * (1.0 + (floor.freedom as f64).sqrt().recip());
+    Some(best.min_by(|a, b| at_most_mm(a).total_cmp(&at_most_mm(b))).unwrap_or(whole))
+}
+
+/// Places of a shift that are tried.
+const MOST_CUTS: usize = 64;
+/// Fewest poses that were measured before and after a shift.
+const FEWEST_ACROSS: usize = 4;
+/// Share of the differences across a shift that their mean must explain.
+const IN_COMMON: f64 = 0.7;
+
+/// The rows of each repeated pose, outlet and approach, with their readings.
+fn readings_of_poses(data: &Dataset) -> Vec<Vec<(usize, Vector3<f64>)>> {
+    with_poses(data, |poses| {
+        let mut out = Vec::new();
+        for pose in poses.filter(|pose| pose.len() > 1) {
+            let mut alike: BTreeMap<(usize, [i8; 6]), Vec<(usize, Vector3<f64>)>> = BTreeMap::new();
+            for &i in pose {
+                let row = &data.rows[i];
+                let key = (row.anchor, row.condition.approach);
+                alike.entry(key).or_default().push((i, row.reading.place_mm()));
+            }
+            out.extend(alike.into_values().filter(|rows| rows.len() > 1));
+        }
+        out
+    })
+}
+
+/// The scatter before and after the row `cut`, where the readings after it differ by a common vector.
+fn floor_on_either_side(
+    groups: &[Vec<(usize, Vector3<f64>)>],
+    are_copied: bool,
+    cut: usize,
+) -> Option<NoiseFloor> {
+    let mut scatter = Scatter::default();
+    let mut across: Vec<Vector3<f64>> = Vec::new();
+    for group in groups {
+        let side = |is_after: bool| -> Vec<Vector3<f64>> {
+            group.iter().filter(|(row, _)| (*row >= cut) == is_after).map(|(_, at)| *at).collect()
+        };
+        let [before, after] = [false, true].map(side);
+        if !before.is_empty() && !after.is_empty() {
+            let mean = |of: &[Vector3<f64>]| of.iter().sum::<Vector3<f64>>() / of.len() as f64;
+            across.push(mean(&after) - mean(&before));
+        }
+        for readings in [before, after] {
+            scatter.add(&if are_copied { distinct(&readings) } else { readings });
+        }
+    }
+    let count = across.len() as f64;
+    let common = across.iter().sum::<Vector3<f64>>().norm_squared() / count;
+    let all: f64 = across.iter().map(Vector3::norm_squared).sum();
+    let is_shift = across.len() >= FEWEST_ACROSS && common > IN_COMMON * all;
+    scatter.pooled().filter(|floor| is_shift && floor.is_known())
 }
 
 /// The noise floor of orientations (rad), from rotation vectors relative to the first reading of each pose, as the root of the

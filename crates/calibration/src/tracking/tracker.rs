@@ -377,6 +377,16 @@ impl Tracker {
         self.state.outliers > FEW_OUTLIERS && 10 * self.state.outliers > self.state.poses
     }
 
+    /// How many of so many latest poses fit neither the arm nor a detected change, where that is more than a third of them: the arm, the sensor
+    /// or the target is another one now, whatever the earlier poses said.
+    pub fn latest_set_aside(&self) -> Option<[usize; 2]> {
+        let bound = outlier_bound(self.state.sensor.scalars());
+        let latest = self.state.history.iter().rev().take(2 * self.state.options.window.max(1));
+        let (all, aside) = latest
+            .fold((0, 0), |(all, aside), record| (all + 1, aside + usize::from(!(record.nis <= bound))));
+        (aside > FEW_OUTLIERS && 3 * aside > all).then_some([aside, all])
+    }
+
     /// The state to save.
     pub fn state(&self) -> &State {
         &self.state

@@ -47,15 +47,17 @@ pub(super) struct Alternative {
     columns: Vec<usize>,
 }
 
-/// Each scale error alone, and beside each further error.
+/// Each scale error alone, and beside each further error; with or without those that are objections only.
 pub(super) fn alternatives(
     fitted: &Fitted,
     tolerance: &Tolerance,
     readings: &LinearisedReadings,
+    with_objections: bool,
 ) -> Vec<Alternative> {
     let scale = fitted.parameters.len();
     let scale_priors = scale_priors(fitted, tolerance);
-    let any: f64 = readings.laws.iter().map(|(law, _)| law.probability()).sum();
+    let laws = || readings.laws.iter().filter(|(law, _)| with_objections || !law.is_objection());
+    let any: f64 = laws().map(|(law, _)| law.probability()).sum();
     let alone = scale_priors.iter().map(|prior| Alternative {
         scale: prior.sigma,
         law: None,
@@ -63,7 +65,7 @@ pub(super) fn alternatives(
         columns: prior.sigma.map(|_| scale).into_iter().collect(),
     });
     let priors = &scale_priors[..];
-    let beside = readings.laws.iter().flat_map(|(law, columns)| {
+    let beside = laws().flat_map(|(law, columns)| {
         priors.iter().map(move |prior| Alternative {
             scale: prior.sigma,
             law: Some(*law),
@@ -197,6 +199,15 @@ impl Hypothesis {
         Some((factor, log_determinant, mean))
     }
 
+    /// Squared residual that its posterior mean leaves, per degree of freedom.
+    fn residual_variance(&self, equations: &Equations, readings: &LinearisedReadings) -> Option<f64> {
+        let (.., mean) = self.solve(equations)?;
+        let square =
+            readings.square - 2.0 * equations.right.dot(&mean) + mean.dot(&(&equations.matrix * &mean));
+        let freedom = readings.count.checked_sub(mean.len()).filter(|freedom| *freedom > 0)?;
+        Some(square / freedom as f64)
+    }
+
     /// Log of prior probability times evidence, up to a constant.
     fn log_evidence(&self, equations: &Equations, readings: &LinearisedReadings) -> Option<f64> {
         let (_, log_determinant, mean) = self.solve(equations)?;
@@ -247,13 +258,14 @@ pub(super) fn weighted_posteriors(
     let equations: Vec<Equations> =
         alternatives.iter().map(|alternative| alternative.normal_equations(readings, arm)).collect();
     let equations_of = |hypothesis: &Hypothesis| &equations[hypothesis.alternative];
-    let evidences: Vec<Option<f64>> = hypotheses
+    let mut evidences: Vec<Option<f64>> = hypotheses
         .par_iter()
         .map(|hypothesis| {
             checkpoint();
             hypothesis.log_evidence(equations_of(hypothesis), readings)
         })
         .collect();
+    drop_idle_objections(hypotheses, alternatives, &equations, readings, &mut evidences);
     let best = evidences.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
     let posteriors = hypotheses
         .par_iter()
@@ -270,6 +282,39 @@ pub(super) fn weighted_posteriors(
         .collect::<Vec<_>>();
     (!posteriors.is_empty()).then_some(posteriors)
 }
+
+/// Takes the evidence from objections that explain hardly any of what is left without them: thousands of rows turn any rest that an arm
+/// leaves into evidence of whatever follows it a little, and few rows leave it to chance.
+fn drop_idle_objections(
+    hypotheses: &[Hypothesis],
+    alternatives: &[Alternative],
+    equations: &[Equations],
+    readings: &LinearisedReadings,
+    evidences: &mut [Option<f64>],
+) {
+    let is_objection = |hypothesis: &Hypothesis| {
+        alternatives[hypothesis.alternative].law.is_some_and(SensorLaw::is_objection)
+    };
+    let left = |with: bool| {
+        let own =
+            hypotheses.iter().zip(&*evidences).filter(|(hypothesis, _)| is_objection(hypothesis) == with);
+        let (best, _) = own
+            .filter_map(|(hypothesis, evidence)| Some((hypothesis, (*evidence)?)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        best.residual_variance(&equations[best.alternative], readings)
+    };
+    let (Some(with), Some(without)) = (left(true), left(false)) else { return };
+    if with > EXPLAINED * without {
+        for (_, evidence) in
+            hypotheses.iter().zip(evidences).filter(|(hypothesis, _)| is_objection(hypothesis))
+        {
+            *evidence = None;
+        }
+    }
+}
+
+/// Share of the variance of the residuals that an objection must leave at most.
+const EXPLAINED: f64 = 0.85;
 
 /// Log evidence relative to the best hypothesis below which a hypothesis is dropped.
 const NEGLIGIBLE: f64 = -14.0;

@@ -1,8 +1,13 @@
 //! What a model leaves beyond the noise, as far as it is known.
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
 use truegrind_arm::estimated::StageErrors;
 use truegrind_calibration::identification::beyond_noise::BeyondNoise;
 use truegrind_calibration::measurement::dataset::Sensor;
+use truegrind_calibration::measurement::noise_floor::NoiseFloor;
 use truegrind_math::statistics::ErrorSummary;
 
 /// Errors of this size (mm).
@@ -44,4 +49,43 @@ fn a_scatter_that_is_seen_does_not_hide_what_else_may_be_left() {
     assert_eq!(left.known_mm(), Some(0.1));
     assert_eq!(BeyondNoise::AtMost(0.5).at_least_scatter(0.0), BeyondNoise::AtMost(0.5));
     assert_eq!(BeyondNoise::Known(0.05).at_least_scatter(0.1), BeyondNoise::Known(0.1));
+}
+
+/// Lengths of `count` errors, of which `freedom` coordinates are independent, each of this standard deviation (mm).
+fn drawn(rng: &mut ChaCha8Rng, count: usize, freedom: usize, sigma_mm: f64) -> ErrorSummary {
+    let square: f64 = (0..freedom)
+        .map(|_| {
+            let v: f64 = StandardNormal.sample(rng);
+            v * v
+        })
+        .sum();
+    let rms = sigma_mm * (square / count as f64).sqrt();
+    ErrorSummary::of(std::iter::repeat_n(rms, count))
+}
+
+/// Round a part of sixty poses the excess over twelve repeated ones is hardly ever significant, and larger than all else that is stated.
+#[test]
+fn an_excess_over_the_noise_is_expected_though_it_is_not_significant() {
+    const NOISE_MM: f64 = 0.02;
+    const LACKING_MM: f64 = 0.02;
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let stated = |lacking: f64, rng: &mut ChaCha8Rng| {
+        let sigma_mm = NOISE_MM.hypot(lacking);
+        let errors = StageErrors {
+            fitted: drawn(rng, 47, 3 * 47 - 36, sigma_mm),
+            held_out: drawn(rng, 12, 36, sigma_mm),
+        };
+        let floor = NoiseFloor { sigma_mm: drawn(rng, 12, 36, NOISE_MM).rmse, poses: 12, freedom: 12 };
+        let beyond = BeyondNoise::of(&errors, 36, Sensor::Position, Some(&floor));
+        beyond.known_mm().unwrap() / (3_f64.sqrt() * LACKING_MM)
+    };
+    let ratios: Vec<f64> = (0..200).map(|_| stated(LACKING_MM, &mut rng)).collect();
+    let mean_square = ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / 200.0;
+    let low = ratios.iter().filter(|ratio| **ratio < 1.0 / 1.3).count();
+    assert!((mean_square - 1.0).abs() < 0.1, "{mean_square}");
+    assert!(low < 30, "{low} of 200");
+    // Without an excess what chance leaves of one is below the noise itself.
+    let ratios: Vec<f64> = (0..200).map(|_| stated(0.0, &mut rng)).collect();
+    let mean_square = ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / 200.0;
+    assert!(mean_square < 0.15, "{mean_square}");
 }

@@ -8,11 +8,13 @@ use rand_distr::{Distribution, StandardNormal};
 
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::Inverse;
-use truegrind_arm::model::Joints;
+use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::robots;
 use truegrind_calibration::identification::calibration::Frames;
 use truegrind_calibration::identification::start::candidate_frames;
-use truegrind_calibration::identification::stated_frame::{contradiction, judged_by_fit};
+use truegrind_calibration::identification::stated_frame::{
+    contradicted_target, contradiction, judged_by_fit, target_contradiction_by_fit,
+};
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_math::se3::Pose;
@@ -24,12 +26,10 @@ fn tracker() -> Pose {
     Pose::from_parts(Vector3::new(1900.0, -500.0, 300.0).into(), turn)
 }
 
-/// Readings in a box of 60 mm by an arm whose joint zeros and links are off as on an arm that was never calibrated.
-fn small_box(seed: u64) -> Dataset {
-    let (nominal, still) = (robots::load("abb-irb-120").unwrap().model, Condition::default());
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+/// An arm whose joint zeros and links are off as on an arm that was never calibrated.
+fn uncalibrated(nominal: &Model, rng: &mut ChaCha8Rng) -> Model {
     let mut normal = |sigma: f64| {
-        let v: f64 = StandardNormal.sample(&mut rng);
+        let v: f64 = StandardNormal.sample(rng);
         v * sigma
     };
     let mut actual = nominal.clone();
@@ -39,6 +39,24 @@ fn small_box(seed: u64) -> Dataset {
         link.alpha_rad += normal(2e-3);
         link.theta_rad += normal(4e-3);
     }
+    actual
+}
+
+/// What the tracker sees of the target of an arm.
+fn seen(actual: &Model, joints: &Joints, rng: &mut ChaCha8Rng) -> Reading {
+    let at = tracker().inverse() * (actual.forward(joints, &Condition::default()) * Point3::from(TARGET_MM));
+    let noise = Vector3::from_fn(|_, _| {
+        let v: f64 = StandardNormal.sample(rng);
+        0.02 * v
+    });
+    Reading::Position(at.coords + noise)
+}
+
+/// Readings in a box of 60 mm.
+fn small_box(seed: u64) -> Dataset {
+    let (nominal, still) = (robots::load("abb-irb-120").unwrap().model, Condition::default());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let actual = uncalibrated(&nominal, &mut rng);
     let inverse = Inverse::new(&nominal, &still, &nominal);
     let middle = Joints::from_column_slice(&[0.0, 20.0, 0.0, 0.0, 60.0, 0.0].map(f64::to_radians));
     let centre = nominal.forward(&middle, &still);
@@ -49,12 +67,7 @@ fn small_box(seed: u64) -> Dataset {
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(within(0.3), within(0.3), within(0.3)));
         let at = Pose::from_parts((centre.translation.vector + place).into(), turn * centre.rotation);
         let Ok(found) = inverse.solve_near(&at, &middle) else { continue };
-        let seen = tracker().inverse() * (actual.forward(&found.joints, &still) * Point3::from(TARGET_MM));
-        let noise = Vector3::from_fn(|_, _| {
-            let v: f64 = StandardNormal.sample(&mut rng);
-            0.02 * v
-        });
-        rows.push(Row::new(rows.len(), found.joints, Reading::Position(seen.coords + noise)));
+        rows.push(Row::new(rows.len(), found.joints, seen(&actual, &found.joints, &mut rng)));
     }
     Dataset::new("box.csv", Sensor::Position, rows)
 }
@@ -85,4 +98,48 @@ fn a_frame_is_judged_by_what_the_fit_leaves_with_it() {
         assert!(wrong.is_some_and(|said| said.contains("without it")), "seed {seed}");
     }
     assert!(refused_by_nominal > 0, "the arm must be off by more than frames of the data sheet's arm may be");
+}
+
+/// Readings along a spiral about a blade, where the flange turns as it moves.
+fn spiral(seed: u64) -> Dataset {
+    let (nominal, still) = (robots::load("abb-irb-120").unwrap().model, Condition::default());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let actual = uncalibrated(&nominal, &mut rng);
+    let inverse = Inverse::new(&nominal, &still, &nominal);
+    let middle = Joints::from_column_slice(&[0.0, 20.0, 0.0, 0.0, 60.0, 0.0].map(f64::to_radians));
+    let centre = nominal.forward(&middle, &still);
+    let mut rows = Vec::new();
+    for k in 0..150 {
+        let share = f64::from(k) / 149.0;
+        let (along_mm, swing) = (240.0 * share - 120.0, 0.5 * (std::f64::consts::TAU * 10.0 * share).sin());
+        let place = Vector3::new(120.0 * swing.sin(), along_mm, 120.0 * (swing.cos() - 1.0));
+        let turn = UnitQuaternion::from_euler_angles(-0.1 * (along_mm / 60.0).sin(), swing, 0.0);
+        let at = Pose::from_parts((centre.translation.vector + place).into(), turn * centre.rotation);
+        let Ok(found) = inverse.solve_near(&at, &middle) else { continue };
+        rows.push(Row::new(rows.len(), found.joints, seen(&actual, &found.joints, &mut rng)));
+    }
+    Dataset::new("spiral.csv", Sensor::Position, rows)
+}
+
+/// A point that was touched exactly is right on a smooth path too, where the data sheet's arm puts it elsewhere; one that is centimetres off is not.
+#[test]
+fn a_touched_point_is_judged_by_what_the_fit_leaves_of_it() {
+    let nominal = robots::load("abb-irb-120").unwrap().model;
+    let of_arm = Tolerance { learn_widths: true, ..Tolerance::default() };
+    let mut refused_by_nominal = 0;
+    for seed in 0..4 {
+        let dataset = spiral(seed);
+        let found = candidate_frames(&dataset, &nominal).unwrap().remove(0);
+        for off_mm in [0.0, 30.0] {
+            let touched = Pose::translation(TARGET_MM[0], TARGET_MM[1] + off_mm, TARGET_MM[2]);
+            let by_nominal = contradicted_target(&dataset, &nominal, &touched, 0.5, &found);
+            let by_fit = target_contradiction_by_fit(&of_arm, &touched, 0.5, &found, (&dataset, &nominal));
+            assert_eq!(by_fit.is_some(), off_mm > 0.0, "seed {seed}, {off_mm} mm off: {by_fit:?}");
+            refused_by_nominal += usize::from(off_mm == 0.0 && by_nominal.is_some());
+        }
+    }
+    assert!(
+        refused_by_nominal > 0,
+        "the arm must be off by more than a point beside the data sheet's arm may be"
+    );
 }

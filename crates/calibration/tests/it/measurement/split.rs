@@ -1,8 +1,13 @@
 //! Splits keep repeated poses together, cover every row, and depend on nothing but the seed.
 
+use nalgebra::Vector3;
+use rand::{RngExt as _, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
 use truegrind_arm::model::Joints;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
-use truegrind_calibration::measurement::noise_floor::noise_floor;
+use truegrind_calibration::measurement::noise_floor::{noise_floor, noise_floor_beside_shift};
 use truegrind_calibration::measurement::repeated_poses::poses;
 use truegrind_calibration::measurement::split::{self, Split};
 
@@ -131,6 +136,38 @@ fn blocks_leave_repetitions_of_their_poses_out_of_the_fit() {
     let blocks = split::blocks(&data, 4);
     assert_eq!(blocks[1].test, (50..100).collect::<Vec<_>>());
     assert_eq!(blocks[1].train, (0..50).chain(100..150).collect::<Vec<_>>());
+}
+
+/// A hundred poses and twelve of them again; from `shifted` on the sensor's readings are 0.37 mm off.
+fn repeated_at_the_end(seed: u64, shifted: usize, sigma_mm: f64) -> Dataset {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut poses: Vec<Joints> =
+        (0..100).map(|_| Joints::from_fn(|_, _| rng.random_range(-1.0..1.0))).collect();
+    poses.extend((0..12).map(|k| poses[8 * k + 3]).collect::<Vec<_>>());
+    let rows = poses.iter().enumerate().map(|(i, q)| {
+        let noise = Vector3::from_fn(|_, _| {
+            let v: f64 = StandardNormal.sample(&mut rng);
+            sigma_mm * v
+        });
+        let shift = if i < shifted { Vector3::zeros() } else { Vector3::new(0.2, 0.3, 0.1) };
+        Row::new(i, *q, Reading::Position(Vector3::new(q[0], q[1], q[2]) * 500.0 + shift + noise))
+    });
+    Dataset::new("shift.csv", Sensor::Position, rows.collect::<Vec<_>>())
+}
+
+/// Repetitions on both sides of a shift of the sensor showed six times its noise.
+#[test]
+fn a_shift_of_the_sensor_is_no_noise() {
+    for seed in 0..20 {
+        let true_mm = 0.02 * 3_f64.sqrt();
+        let data = repeated_at_the_end(seed, 56, 0.02);
+        let [whole, beside] = [noise_floor(&data), noise_floor_beside_shift(&data)].map(Option::unwrap);
+        assert!(whole.sigma_mm > 3.0 * true_mm, "seed {seed}: {whole:?}");
+        assert!((beside.sigma_mm / true_mm - 1.0).abs() < 0.6, "seed {seed}: {beside:?}");
+        // Noise alone, however large, is no shift.
+        let noisy = repeated_at_the_end(seed, 200, 0.2);
+        assert_eq!(noise_floor(&noisy), noise_floor_beside_shift(&noisy), "seed {seed}");
+    }
 }
 
 #[test]

@@ -415,3 +415,23 @@ fn alarms_show_the_digits_that_tell_something() {
     let whole = Alarm { shift: 2.83, sigma: 4.46, unit: "mm".to_owned(), parts: vec![part], ..alarm };
     assert!(whole.to_string().contains("by an amount that the poses do not show yet"), "{whole}");
 }
+
+/// A collision that two joints lose their zeros in is no single change. What came before says nothing of the arm as it is, however long it was.
+#[test]
+fn poses_that_are_set_aside_at_the_end_are_told_however_many_fitted_before() {
+    let collided = "[[arm.link]]\njoint = 2\ntheta_deg = 0.04\n[[arm.link]]\njoint = 4\ntheta_deg = 0.08\n[[arm.link]]\njoint = 5\ntheta_deg = -0.09\n[arm.random]";
+    let mut dataset = measured(2, None);
+    for seed in 20..25 {
+        dataset.rows.extend(measured(seed, None).rows);
+    }
+    let (calm, _) = tracked(&dataset);
+    assert_eq!(calm.latest_set_aside(), None);
+    let after = super::simulated(&super::RECIPE.replace("[arm.random]", collided), 30);
+    dataset.rows.extend(after.rows.into_iter().take(50));
+    let (tracker, alarms) = tracked(&dataset);
+    let said: Vec<String> = alarms.iter().map(ToString::to_string).collect();
+    assert!(alarms.iter().any(|alarm| alarm.course == Course::Burst), "{said:#?}");
+    assert!(!tracker.mostly_set_aside(), "{}", tracker.state().outliers);
+    let [aside, all] = tracker.latest_set_aside().expect("the latest poses do not fit");
+    assert!(all == 30 && aside > 15, "{aside} of {all}");
+}
