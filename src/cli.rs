@@ -158,7 +158,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<ExitStatus> {
         Verb::Path(arguments) => path::run(&arguments),
         Verb::Cell(arguments) => cell::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
-        Verb::Deviation(arguments) => deviation::run(&arguments),
+        Verb::Deviation(arguments) => deviation::run(&arguments.with_programs()?),
         Verb::Gather(arguments) => gather::run(&arguments),
         Verb::Accept(arguments) => accept::run(&arguments),
         Verb::Export(arguments) => export::run(&arguments),

@@ -13,6 +13,7 @@ use truegrind::arm::model::Model;
 use truegrind::compensation::cell::{Cell, Used};
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
+use truegrind::programs::motion::Listing;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::report::deviation as view;
 use truegrind::report::status::Status;
@@ -34,7 +35,6 @@ use super::terminal::print_message;
 #[derive(Debug, Clone, Args)]
 pub(super) struct Arguments {
     /// Programs: RAPID modules of one task, .pgf task lists, NC files, or folders of them.
-    #[arg(required = true)]
     programs: Vec<PathBuf>,
     #[command(flatten)]
     grouping: Grouping,
@@ -90,6 +90,28 @@ fn check_combinations(arguments: &Arguments, jobs: usize, several: bool) -> anyh
         );
     }
     Ok(())
+}
+
+impl Arguments {
+    /// Programs that were named behind `--model`, which takes several files, are programs.
+    pub(super) fn with_programs(mut self) -> anyhow::Result<Self> {
+        if self.programs.is_empty() {
+            let is_model = |name: &String| name == "nominal" || name.ends_with(".toml");
+            let (models, programs): (Vec<_>, Vec<_>) =
+                std::mem::take(&mut self.model).into_iter().partition(is_model);
+            self.model = models;
+            self.programs = programs.into_iter().map(PathBuf::from).collect();
+        }
+        if self.programs.is_empty() {
+            bail!(
+                "no program was named: expected RAPID modules, NC files, .pgf task lists, or folders of them"
+            );
+        }
+        if self.model.is_empty() {
+            bail!("--model names no model file (.toml)");
+        }
+        Ok(self)
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
@@ -311,23 +333,7 @@ impl DeviationContext<'_> {
             }
             _ => programs.name(),
         };
-        if let Some(original) = &original {
-            let [moves, intended] = [&task, original].map(|program| program.listing().motions.len());
-            // Rewriting inserts motions and removes none.
-            if moves < intended {
-                bail!(
-                    "{name}: {moves} motions, but the program of --intended has {intended}: give the program from which it was rewritten"
-                );
-            }
-        }
-        if original.is_none()
-            && let Some(mark) = task.listing().marks.iter().flatten().next()
-        {
-            bail!(
-                "{name}: already corrected with model {}; give the original program as well (--intended)",
-                mark.model
-            );
-        }
+        refuse_other_original(&name, task.listing(), original.as_ref().map(|original| original.listing()))?;
         // The original defines the intended path.
         let cell = self.arguments;
         if let Some(Runner { robot: Some(robot), nominal, .. }) = self.runners.first() {
@@ -373,6 +379,27 @@ impl DeviationContext<'_> {
         }
         Ok(ProgramReports { name: job.name(), reports, used: Some(used), failed: None })
     }
+}
+
+/// Refuses an original with more motions than its correction, and a correction without its original.
+fn refuse_other_original(name: &str, task: &Listing, original: Option<&Listing>) -> anyhow::Result<()> {
+    let Some(original) = original else {
+        if let Some(mark) = task.marks.iter().flatten().next() {
+            bail!(
+                "{name}: already corrected with model {}; give the original program as well (--intended)",
+                mark.model
+            );
+        }
+        return Ok(());
+    };
+    // Rewriting inserts motions and removes none.
+    let [moves, intended] = [task, original].map(|listing| listing.motions.len());
+    if moves < intended {
+        bail!(
+            "{name}: {moves} motions, but the program of --intended has {intended}: give the program from which it was rewritten"
+        );
+    }
+    Ok(())
 }
 
 /// Reasons that are told of a program without a point.

@@ -39,7 +39,7 @@ pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) 
     page.figure(
         Graph {
             title: "Normalised innovations squared of the latest poses".to_owned(),
-            x: Axis::new("pose of the history", ""),
+            x: Axis::new("pose, latest last", ""),
             y: Axis::log("NIS", ""),
             series: vec![Series::points("", points)],
             references: vec![Reference::Horizontal(tracker.state().sensor.scalars() as f64, "expected mean".to_owned())],
@@ -60,54 +60,13 @@ fn sources(tracker: &Tracker) -> Vec<Source> {
     tracker.state().consumed.iter().map(of).collect()
 }
 
+/// Verdict, key figures, and where the model is.
 fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) {
     let state = tracker.state();
     let departure = tracker.departure();
     let departed = departure.as_ref().filter(|departure| departure.is_significant);
-    let changes = match alarms.len() {
-        0 => "no change detected in them".to_owned(),
-        1 => "one change detected".to_owned(),
-        n => format!("{n} changes detected"),
-    };
-    let processed = format!("{fresh} new poses processed, {changes}");
     let set_aside = tracker.latest_set_aside();
-    let (status, headline) = match (&departure, departed) {
-        (_, Some(now)) if !now.is_of_shape => {
-            let but = if alarms.is_empty() { ", but" } else { ";" };
-            (Status::Warning, format!("{processed}{but} {}", unseen_headline(now)))
-        }
-        (_, Some(now)) => {
-            let but = if alarms.is_empty() { ", but" } else { ";" };
-            let headline = format!(
-                "{processed}{but} the arm is {:.3} mm from the model that the programs were corrected with: they are not known to \
-                 remain valid",
-                now.rms_mm
-            );
-            (Status::Warning, headline)
-        }
-        _ if set_aside.is_some() || tracker.mostly_set_aside() => {
-            let but = if alarms.is_empty() { ", but" } else { ";" };
-            let headline = format!(
-                "{processed}{but} readings no longer agree with the model that the programs were corrected with: they are not known to remain \
-                 valid"
-            );
-            (Status::Warning, headline)
-        }
-        _ if !alarms.is_empty() => (Status::Warning, processed),
-        _ if tracker.worse_fit().is_some() => (
-            Status::Warning,
-            format!(
-                "{processed}, but they fit less well than at the beginning: the programs are not known to remain valid"
-            ),
-        ),
-        (Some(_), None) => (
-            Status::Good,
-            format!(
-                "{processed}, and the arm agrees with the model that the programs were corrected with: they remain valid"
-            ),
-        ),
-        (None, None) => (Status::Good, processed),
-    };
+    let (mut status, mut headline) = headline(tracker, fresh, alarms, departure.as_ref());
     let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
     let earlier = departed.filter(|_| alarms.is_empty()).and_then(reported);
     reasons.extend(earlier.map(|alarm| format!("reported in an earlier run: {alarm}")));
@@ -121,7 +80,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
              that of the earlier poses"
         )
     }));
-    let (status, headline) = if tracker.mostly_set_aside() {
+    if tracker.mostly_set_aside() {
         reasons.insert(
             0,
             format!(
@@ -130,48 +89,106 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
                 state.outliers, state.poses
             ),
         );
-        (Status::Bad, format!("{headline}; too many poses do not fit"))
-    } else {
-        (status, headline)
-    };
+        status = Status::Bad;
+        headline.push_str("; too many poses do not fit");
+    }
     if set_aside.is_some() || tracker.mostly_set_aside() {
         reasons.push(DO_NOT_FIT.to_owned());
     } else if status == Status::Warning {
-        reasons.push(
-            match departed {
-                Some(now) if !now.is_of_shape && !has_turned(now) => {
-                    "what to do: check the mark of joint 6 and touch a known point with the tool. If they are right, the reflector moved: begin a new \
-                     track (--state). If not, measure the arm, identify it, and compensate the original programs again"
-                }
-                Some(now) if !now.is_of_shape => {
-                    "what to do: find out what turned, as said above. If it was joint 1 or the base, put it right or teach the work objects \
-                     again; then begin a new track (--state)"
-                }
-                Some(_) => {
-                    "what to do: measure the arm, identify it, and compensate the original programs again; until then, the model written \
-                     here is the best known. Begin a new track with the new model (--model, --state)"
-                }
-                None => {
-                    "what to do: if the arm changed, correct the original programs with the new model; if sensor or target moved, mount \
-                     them firmly"
-                }
-            }
-            .to_owned(),
-        );
+        reasons.push(what_to_do(departed).to_owned());
     }
     reasons.extend(noise_sentences(tracker));
     page.push(Verdict::new(status, headline, reasons));
+    page.push(key_figures(tracker, alarms.len(), departure.as_ref()));
+    page.paragraph(format!("Model written: {model}"));
+}
+
+/// Whether the programs remain valid.
+fn headline(
+    tracker: &Tracker,
+    fresh: usize,
+    alarms: &[Alarm],
+    departure: Option<&Departure>,
+) -> (Status, String) {
+    let changes = match alarms.len() {
+        0 => "no change detected in them".to_owned(),
+        1 => "one change detected".to_owned(),
+        n => format!("{n} changes detected"),
+    };
+    let processed = format!("{fresh} new poses processed, {changes}");
+    let but = if alarms.is_empty() { ", but" } else { ";" };
+    match departure {
+        Some(now) if now.is_significant && !now.is_of_shape => {
+            (Status::Warning, format!("{processed}{but} {}", unseen_headline(now)))
+        }
+        Some(now) if now.is_significant => {
+            let headline = format!(
+                "{processed}{but} the arm is {:.3} mm from the model that the programs were corrected with: they are not known to \
+                 remain valid",
+                now.rms_mm
+            );
+            (Status::Warning, headline)
+        }
+        _ if tracker.latest_set_aside().is_some() || tracker.mostly_set_aside() => {
+            let headline = format!(
+                "{processed}{but} readings no longer agree with the model that the programs were corrected with: they are not known to remain \
+                 valid"
+            );
+            (Status::Warning, headline)
+        }
+        _ if !alarms.is_empty() => (Status::Warning, processed),
+        _ if tracker.worse_fit().is_some() => (
+            Status::Warning,
+            format!(
+                "{processed}, but they fit less well than at the beginning: the programs are not known to remain valid"
+            ),
+        ),
+        Some(_) => (
+            Status::Good,
+            format!(
+                "{processed}, and the arm agrees with the model that the programs were corrected with: they remain valid"
+            ),
+        ),
+        None => (Status::Good, processed),
+    }
+}
+
+/// What to do about a change.
+fn what_to_do(departed: Option<&Departure>) -> &'static str {
+    match departed {
+        Some(now) if !now.is_of_shape && !has_turned(now) => {
+            "what to do: check the mark of joint 6 and touch a known point with the tool. If they are right, the reflector moved: begin a new \
+             track (--state). If not, measure the arm, identify it, and compensate the original programs again"
+        }
+        Some(now) if !now.is_of_shape => {
+            "what to do: find out what turned, as said above. If it was joint 1 or the base, put it right or teach the work objects \
+             again; then begin a new track (--state)"
+        }
+        Some(_) => {
+            "what to do: measure the arm, identify it, and compensate the original programs again; until then, the model written \
+             here is the best known. Begin a new track with the new model (--model, --state)"
+        }
+        None => {
+            "what to do: if the arm changed, correct the original programs with the new model; if sensor or target moved, mount \
+             them firmly"
+        }
+    }
+}
+
+fn key_figures(tracker: &Tracker, changes: usize, departure: Option<&Departure>) -> Vec<KeyFigure> {
+    let state = tracker.state();
     let nis: Vec<f64> = state.history.iter().map(|s| s.nis).filter(|n| n.is_finite()).collect();
     // A single pose after remounting may have a NIS of a million, which would dominate the mean.
     let usual = (!nis.is_empty()).then(|| median(&nis));
     let expected = tracker.expected_median_nis();
-    page.push(vec![
+    vec![
         KeyFigure::new("Poses", state.poses, 0, "").note(format!("{} set aside", state.outliers)),
-        KeyFigure::new("NIS of the latest poses", usual, 2, "").note(format!(
-            "median of the normalised innovation squared; {expected:.1} expected if arm, sensor and noise match the model"
+        KeyFigure::new("Misfit of the latest poses", usual, 2, "").note(format!(
+            "median of the squared difference of readings and model, in units of what is expected (NIS); {expected:.1} if arm, sensor and \
+             noise match the model"
         )),
-        KeyFigure::new("Arm against the first model", departure.as_ref().map(|now| now.rms_mm), 3, "mm").note(
-            departure.as_ref().map_or_else(String::new, |now| {
+        KeyFigure::new("Arm against the first model", departure.map(|now| now.rms_mm), 3, "mm").note(
+            departure.map_or_else(String::new, |now| {
                 format!(
                     "RMS over the measured region, apart from the placement of base and target; {:.3} mm expected from the \
                      uncertainties",
@@ -179,9 +196,8 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
                 )
             }),
         ),
-        KeyFigure::new("Changes", state.alarms.len(), 0, "").note(format!("{} in the new poses", alarms.len())),
-    ]);
-    page.paragraph(format!("Model written: {model}"));
+        KeyFigure::new("Changes", state.alarms.len(), 0, "").note(format!("{changes} in the new poses")),
+    ]
 }
 
 /// What to do where many poses fit neither the arm nor a change of one part.

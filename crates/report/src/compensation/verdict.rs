@@ -191,9 +191,8 @@ fn inserted_reason(plan: &Plan) -> Option<String> {
 fn paths(plan: &Plan, listing: &Listing) -> [usize; 3] {
     let mut found = [0; 3];
     // Nothing is cut on a lift from wherever the robot stands.
-    let is_lift = |outcome: &MotionOutcome| {
-        outcome.reason() == Some(OutcomeReason::Program(Reason::CurrentPosition))
-    };
+    let is_lift =
+        |outcome: &MotionOutcome| outcome.reason() == Some(OutcomeReason::Program(Reason::CurrentPosition));
     for outcome in plan.outcomes.iter().filter(|outcome| !is_lift(outcome)) {
         if is_path(&listing.motions[outcome.motion as usize]) {
             let right = outcome.reason() == Some(OutcomeReason::NoChange);

@@ -184,6 +184,12 @@ fn steps(report: &PathReport) -> Option<String> {
     ))
 }
 
+/// The held-out error of the model; nothing of a simulated arm, which has none.
+fn of_model(report: &PathReport) -> String {
+    let words = |mm| format!("; held-out error of the model {}", known(Some(mm)));
+    report.held_out_mm.map_or_else(String::new, words)
+}
+
 /// Deviation before and after.
 fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
     match judged {
@@ -195,29 +201,30 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape(report) =>
         {
             format!(
-                "Shape of the path {before:.3} mm RMS before, {after:.3} mm after ({}); its placement is not corrected, {place_mm:.3} mm RMS as it lies; held-out error of the model {}",
+                "Shape of the path {before:.3} mm RMS before, {after:.3} mm after ({}); its placement is not corrected, {place_mm:.3} mm RMS as it lies{}",
                 meaning(report.after),
-                known(report.held_out_mm),
+                of_model(report),
             )
         }
         [(report, ..)] if report.expected_mm().is_some() => {
             // Both unsigned, since the expected deviation has no sign.
             let before = size(report);
             format!(
-                "Largest deviation {} before, {} expected after (1σ); held-out error of the model {}",
+                "Largest deviation {} before, {} expected after (1σ){}",
                 known(before),
                 known(report.expected_mm()),
-                known(report.held_out_mm),
+                of_model(report),
             )
         }
         [(report, before, after)] => format!(
-            "Largest deviation{} {before:.3} mm before, {after:.*} mm after ({}); predicted 1σ {}, held-out error of the \
-             model {}",
+            "Largest deviation{} {before:.3} mm before, {after:.*} mm after ({}){}{}",
             along_normal(report),
             decimals(report.after),
             meaning(report.after),
-            known(report.sigma_rms_mm()),
-            known(report.held_out_mm),
+            report
+                .sigma_rms_mm()
+                .map_or_else(String::new, |mm| format!("; predicted 1σ {}", known(Some(mm)))),
+            of_model(report),
         ),
         [(first, ..), ..] => {
             let of = |pick: fn(&f64, &f64) -> std::cmp::Ordering| {
