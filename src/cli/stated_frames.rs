@@ -101,15 +101,7 @@ impl FramePriorArguments {
         let Some(stated) = stated else {
             bail!("--frame-sigma needs --sensor-frame, or --outlet and --cable-zero");
         };
-        let (mm, deg) = match numbers("--frame-sigma", text)?[..] {
-            [mm] => (mm, (mm * 1e-3).to_degrees()),
-            [mm, deg] => (mm, deg),
-            _ => bail!("--frame-sigma {text}: expected MM or MM,DEG"),
-        };
-        if !(mm > 0.0 && deg > 0.0) {
-            bail!("--frame-sigma {text}: expected numbers above 0");
-        }
-        let sigma = [mm, deg.to_radians()];
+        let sigma @ [mm, rad] = frame_sigma(text)?;
         let frames = Frames { flange_from_target: target(touched, &found), ..stated.clone() };
         let (judged, geometry) =
             judged_by_fit([&tolerance, of_arm], (&frames, &found), sigma, (dataset, nominal));
@@ -129,8 +121,21 @@ impl FramePriorArguments {
         if let Some(Some(contradiction)) = judged {
             bail!("{contradiction}");
         }
-        Ok((Tolerance { frame_mm: mm, frame_rad: deg.to_radians(), ..tolerance }, frames))
+        Ok((Tolerance { frame_mm: mm, frame_rad: rad, ..tolerance }, frames))
     }
+}
+
+/// Standard deviations of a stated frame (mm, rad). Without an angle 1 mm at a distance of 1 m.
+fn frame_sigma(text: &str) -> anyhow::Result<[f64; 2]> {
+    let (mm, deg) = match numbers("--frame-sigma", text)?[..] {
+        [mm] => (mm, (mm * 1e-3).to_degrees()),
+        [mm, deg] => (mm, deg),
+        _ => bail!("--frame-sigma {text}: expected MM or MM,DEG"),
+    };
+    if !(mm > 0.0 && deg > 0.0) {
+        bail!("--frame-sigma {text}: expected numbers above 0");
+    }
+    Ok([mm, deg.to_radians()])
 }
 
 /// Uncertainty of a frame or point whose own is not stated, to judge it (mm).

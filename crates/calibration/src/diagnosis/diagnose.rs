@@ -75,20 +75,7 @@ pub fn diagnose(
     let subject =
         Subject { observed: &prepared.observed, nominal: nominal_arm, frames, tolerance: &tolerance };
     let registered = nominal(&subject);
-    let typical = residual_tests::median_error_mm(&registered);
-    if !(typical < WRONG_ARM_MM) {
-        return Err(DiagnoseError::WrongArm {
-            file: dataset.file.clone(),
-            robot: robot.to_owned(),
-            rmse_mm: typical,
-            explanation: misreading::explanation(dataset, nominal_arm),
-        });
-    }
-    let turned = median_orientation_error(&prepared.observed, &registered.model, &registered.frames);
-    if let Some(rad) = turned.filter(|rad| *rad > WRONG_ORIENTATION_RAD) {
-        let (file, robot) = (dataset.file.clone(), robot.to_owned());
-        return Err(DiagnoseError::WrongOrientation { file, robot, deg: rad.to_degrees() });
-    }
+    refuse_other_arm(dataset, robot, &registered, &subject)?;
     let needed = poses_needed_at_least(dataset, nominal_arm);
     let thin_rows = thin_rows(&prepared.observed);
     let searched = Subject { observed: thin_rows.as_ref().unwrap_or(&prepared.observed), ..subject };
@@ -142,6 +129,26 @@ pub fn diagnose(
         finding_of_cause,
         pictures,
     })
+}
+
+/// Refuses readings that no arm with this data sheet makes.
+fn refuse_other_arm(
+    dataset: &Dataset,
+    robot: &str,
+    registered: &Extended,
+    subject: &Subject<'_>,
+) -> Result<(), DiagnoseError> {
+    let (file, robot) = (dataset.file.clone(), robot.to_owned());
+    let rmse_mm = residual_tests::median_error_mm(registered);
+    if !(rmse_mm < WRONG_ARM_MM) {
+        let explanation = misreading::explanation(dataset, subject.nominal);
+        return Err(DiagnoseError::WrongArm { file, robot, rmse_mm, explanation });
+    }
+    let turned = median_orientation_error(subject.observed, &registered.model, &registered.frames);
+    match turned.filter(|rad| *rad > WRONG_ORIENTATION_RAD) {
+        Some(rad) => Err(DiagnoseError::WrongOrientation { file, robot, deg: rad.to_degrees() }),
+        None => Ok(()),
+    }
 }
 
 /// Says that there are too few poses.

@@ -138,6 +138,24 @@ fn with_sigma(value: f64, sigma: f64) -> String {
 /// Most decimals without an exponent.
 const MOST_DECIMALS: f64 = 6.0;
 
+impl Alarm {
+    fn fmt_mounted(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} was remounted at row {} of {}: moved by {:.1} mm",
+            self.parameter, self.since_row, self.since_file, self.shift
+        )?;
+        if let Some(turn) = self.parts.first() {
+            write!(f, " and turned by {:.2}°", turn.shift.to_degrees())?;
+        }
+        write!(f, "; {} poses agree on it, and tracking continues from there", self.poses)?;
+        if let [rival, ..] = self.alternatives.as_slice() {
+            write!(f, "; {rival} would explain it as well")?;
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (scale, unit) = display_unit(&self.unit);
@@ -158,19 +176,7 @@ impl fmt::Display for Alarm {
             );
         }
         if self.course == Course::Mounted {
-            write!(
-                f,
-                "{} was remounted at row {} of {}: moved by {:.1} mm",
-                self.parameter, self.since_row, self.since_file, self.shift
-            )?;
-            if let Some(turn) = self.parts.first() {
-                write!(f, " and turned by {:.2}°", turn.shift.to_degrees())?;
-            }
-            write!(f, "; {} poses agree on it, and tracking continues from there", self.poses)?;
-            if let [rival, ..] = self.alternatives.as_slice() {
-                write!(f, "; {rival} would explain it as well")?;
-            }
-            return Ok(());
+            return self.fmt_mounted(f);
         }
         if self.parameter.is_empty() {
             return write!(

@@ -218,16 +218,20 @@ impl ListingBuilder<'_, '_> {
         if has_tool {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }
-        let complete = to && via && count >= instruction.least();
         if motion.to().is_some_and(|to| to.value.is_err()) && self.follows_position(unit, node, instruction) {
             let to = motion.targets.iter_mut().rev().find(|target| target.role == Role::To);
             to.into_iter().for_each(|to| to.value = Err(Reason::CurrentPosition));
         }
-        motion.own_reason = self.refusal(&motion, instruction, &options, complete);
-        // Replacing an impure expression would drop its effect. An unknown target is refused for that reason instead.
-        let known = motion.targets.iter().all(|target| target.value.is_ok());
-        motion.own_reason = motion.own_reason.or((self.impure && known).then_some(Reason::SideEffect));
+        let complete = to && via && count >= instruction.least();
+        motion.own_reason =
+            self.refusal(&motion, instruction, &options, complete).or_else(|| self.side_effect(&motion));
         motion
+    }
+
+    /// Replacing an impure expression would drop its effect. An unknown target is refused for that reason instead.
+    fn side_effect(&self, motion: &Motion) -> Option<Reason> {
+        let known = motion.targets.iter().all(|target| target.value.is_ok());
+        (self.impure && known).then_some(Reason::SideEffect)
     }
 
     /// Why a motion instruction must not be changed: by its own kind, its frames or its speed. `complete`: it has all arguments.
