@@ -69,7 +69,8 @@ impl FramePriorArguments {
         };
         if let Some(touched) = &touched
             && (stated.is_none() || self.touched_sigma.is_some())
-            && contradicted_target(dataset, nominal, touched, self.touched_sigma.unwrap_or(0.0), &found).is_some()
+            && contradicted_target(dataset, nominal, touched, self.touched_sigma.unwrap_or(0.0), &found)
+                .is_some()
         {
             // The arm of the data sheet alone refuses nothing.
             let sigma_mm = self.touched_sigma.unwrap_or(UNSTATED_MM);
