@@ -193,10 +193,13 @@ fn expected_benefit(
 }
 
 /// Whether the further errors that are objections count: where they make doubtful what would not be, or are likelier than not in what is
-/// doubtful anyway. Elsewhere they would only shift the expected errors by what is said of a sensor on the strength of an arm's rest.
+/// doubtful anyway. Elsewhere they would only shift the expected errors by what is said of a sensor on the strength of an arm's rest. A scale
+/// error, which a field contains, is the simpler explanation where it is one.
 fn is_raised(objected: &Benefit, plain: &Benefit) -> bool {
+    let scale = plain.scale.map_or(0.0, |scale| scale.probability);
     let is_likely = objected.law.is_some_and(|law| law.probability > 0.5);
-    objected.probability < MIN_PROBABILITY && (plain.probability >= MIN_PROBABILITY || is_likely)
+    let raises_doubt = plain.probability >= MIN_PROBABILITY && scale <= 0.95;
+    objected.probability < MIN_PROBABILITY && (raises_doubt || (is_likely && scale <= 0.5))
 }
 
 /// The benefit under all models together.

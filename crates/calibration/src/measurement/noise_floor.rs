@@ -76,12 +76,15 @@ const FEWEST_ACROSS: usize = 4;
 /// Share of the differences across a shift that their mean must explain.
 const IN_COMMON: f64 = 0.7;
 
-/// The rows of each repeated pose, outlet and approach, with their readings.
-fn readings_of_poses(data: &Dataset) -> Vec<Vec<(usize, Vector3<f64>)>> {
+/// The rows of a pose, outlet and approach, with their readings.
+type Readings = Vec<(usize, Vector3<f64>)>;
+
+/// Those that were repeated.
+fn readings_of_poses(data: &Dataset) -> Vec<Readings> {
     with_poses(data, |poses| {
         let mut out = Vec::new();
         for pose in poses.filter(|pose| pose.len() > 1) {
-            let mut alike: BTreeMap<(usize, [i8; 6]), Vec<(usize, Vector3<f64>)>> = BTreeMap::new();
+            let mut alike: BTreeMap<(usize, [i8; 6]), Readings> = BTreeMap::new();
             for &i in pose {
                 let row = &data.rows[i];
                 let key = (row.anchor, row.condition.approach);
@@ -94,11 +97,7 @@ fn readings_of_poses(data: &Dataset) -> Vec<Vec<(usize, Vector3<f64>)>> {
 }
 
 /// The scatter before and after the row `cut`, where the readings after it differ by a common vector.
-fn floor_on_either_side(
-    groups: &[Vec<(usize, Vector3<f64>)>],
-    are_copied: bool,
-    cut: usize,
-) -> Option<NoiseFloor> {
+fn floor_on_either_side(groups: &[Readings], are_copied: bool, cut: usize) -> Option<NoiseFloor> {
     let mut scatter = Scatter::default();
     let mut across: Vec<Vector3<f64>> = Vec::new();
     for group in groups {
