@@ -182,7 +182,7 @@ fn part_before_camera(distortion: f64, seed: u64) -> Measured {
             Row::new(
                 i,
                 *q,
-                Reading::Position((distorted + Vector3::from_fn(|_, _| normal(&mut rng, CAMERA_MM))).into()),
+                Reading::Position(distorted + Vector3::from_fn(|_, _| normal(&mut rng, CAMERA_MM))),
             )
         })
         .collect();
