@@ -9,7 +9,7 @@ use truegrind_arm::chain::{Chain, cross, dot, minus, scaled};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_math::lanes::{Real, SinCos, WIDTH};
 
-/// Length added by unit sag of a cable (mm m²): see [`Disturbance`].
+/// Length added by unit sag of a cable (mm m²): see [`Disturbance`](crate::measurement::sensor::disturbance::Disturbance).
 #[inline(always)]
 fn sag_length<R: Real>(away: &V<R>, length: R) -> R {
     length.splat(1e-6 / 24.0) * (away[0] * away[0] + away[1] * away[1]) * length
