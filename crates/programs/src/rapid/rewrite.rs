@@ -386,7 +386,9 @@ impl<'r, 's> Rewriter<'r, 's> {
         let own = users.own.get(&(index, start)).map_or(&[][..], Vec::as_slice);
         let others_hold = users.read_elsewhere.contains(&index)
             || own.iter().any(|user| !updated.contains(user))
-            || groups.iter().any(|(text, _)| *text == original);
+            || groups.iter().any(|(text, _)| *text == original)
+            // Of several wanted values of persistent data none is written: those whose own is not would follow the one that is.
+            || declaration.persistent && groups.len() > 1;
         let mut free = !others_hold;
         for (text, group) in groups {
             if text == original {

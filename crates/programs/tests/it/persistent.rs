@@ -161,6 +161,20 @@ fn a_persistent_target_is_changed_where_it_is_declared_or_not_at_all() {
         let (out, outcome) = rewritten(&text, 0, moved([501.5, -20.25, 304.0]));
         assert_eq!((outcome, out == text), (Outcome::Refused(Reason::Persistent), true), "{other}: {out}");
     }
+    // Two motions that need two values: the second would follow the first's.
+    let twice = source("MoveL pp,v100,fine,tool0;\nMoveL pp,v100,fine,tool0;");
+    let task = Task::read(&[("m.mod", twice.as_bytes())]);
+    let change = |motion: u32, x: f64| Change {
+        motion,
+        targets: [moved([x, -20.25, 304.0])].into(),
+        before: Vec::new(),
+    };
+    let both = |x: [f64; 2]| {
+        let done = task.rewrite(&[change(0, x[0]), change(1, x[1])], &RewriteOptions::default()).unwrap();
+        (done.outcomes, done.files[0].edits.apply(twice.as_bytes()).unwrap() == twice.as_bytes())
+    };
+    assert_eq!(both([501.5, 501.5]), (vec![Outcome::InPlace; 2], false));
+    assert_eq!(both([501.5, 501.4]), (vec![Outcome::Refused(Reason::Persistent); 2], true));
     // Neither do joints in its place, nor a target inserted beside it.
     let joints = NewTarget::Joint { robot_deg: [0.0; 6] };
     assert_eq!(rewritten(&alone, 0, joints).1, Outcome::Refused(Reason::Persistent));
