@@ -2,7 +2,7 @@
 
 /// The axes along which a residual is differentiated. Its length, and with it the cost and the gradient, are the same along all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in super::super) enum Axes {
+pub(in crate::identification::calibration) enum Axes {
     /// Of the base, as residuals are written.
     Base,
     /// Of the sensor's frame. Only then do the derivatives vanish where base and sensor turn together about the first joint, which no

@@ -1,9 +1,9 @@
 //! Rows of a cable's length.
 
-use super::super::columns::EffectColumns;
-use super::super::problem::CalibrationProblem;
 use super::row_geometry::{V, frames, in_base, load, profile, rotates_joints, splat, target_point};
 use super::state::State;
+use crate::identification::calibration::columns::EffectColumns;
+use crate::identification::calibration::problem::CalibrationProblem;
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::chain::{Chain, cross, dot, minus, scaled};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};

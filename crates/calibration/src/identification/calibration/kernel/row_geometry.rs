@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::super::columns::Angles;
-use super::super::problem::CalibrationProblem;
 use super::state::State;
+use crate::identification::calibration::columns::Angles;
+use crate::identification::calibration::problem::CalibrationProblem;
 use truegrind_arm::chain::{Chain, scaled_chain};
 use truegrind_math::lanes::{Real, SinCos, sin_cos, splats};
 

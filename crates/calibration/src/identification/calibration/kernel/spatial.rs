@@ -2,13 +2,13 @@
 
 use nalgebra::Vector3;
 
-use super::super::columns::EffectColumns;
-use super::super::problem::CalibrationProblem;
 use super::axes::Axes;
 use super::row_geometry::{
     V, frames, in_base, load, plus, profile, rotates_joints, splat, target_point, three,
 };
 use super::state::State;
+use crate::identification::calibration::columns::EffectColumns;
+use crate::identification::calibration::problem::CalibrationProblem;
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::chain::{Chain, cross, dot, minus, scaled};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};

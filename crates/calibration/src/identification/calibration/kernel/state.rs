@@ -2,15 +2,15 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::columns::Columns;
-use super::super::problem::CalibrationProblem;
+use crate::identification::calibration::columns::Columns;
+use crate::identification::calibration::problem::CalibrationProblem;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 use truegrind_arm::chain::{self, LinkTable};
 use truegrind_arm::parameter::Parameter;
 use truegrind_math::se3::{Pose, left_jacobian};
 
 /// Row-independent quantities at x.
-pub(in super::super) struct State {
+pub(in crate::identification::calibration) struct State {
     pub(super) tables: [LinkTable; 6],
     pub(super) links_mm: [(f64, f64); 6],
     /// Target in the last DH frame.
@@ -89,7 +89,7 @@ impl DisturbanceColumns {
 }
 
 impl State {
-    pub(in super::super) fn of(problem: &CalibrationProblem, x: &[f64]) -> Self {
+    pub(in crate::identification::calibration) fn of(problem: &CalibrationProblem, x: &[f64]) -> Self {
         let (model, frames) = problem.apply(x);
         let turned = |is: fn(&Parameter) -> Option<usize>| {
             let mut phi = Vector3::zeros();
