@@ -195,7 +195,7 @@ fn part_before_camera(distortion: f64, seed: u64) -> Measured {
 /// Round a part the links take up what a lens does, and programs are worse for it; without a distortion the model is written.
 #[test]
 fn a_part_before_a_camera_whose_lens_distorts_writes_no_worse_arm() {
-    let mut worse = 0;
+    let (mut worse, mut put_down_to_lens) = (0, 0);
     for seed in 0..5 {
         for distortion in [0.0, 0.006, 0.015] {
             let (found, [sheet_mm, estimated_mm]) = judged(&part_before_camera(distortion, seed));
@@ -209,10 +209,14 @@ fn a_part_before_a_camera_whose_lens_distorts_writes_no_worse_arm() {
             if estimated_mm > sheet_mm {
                 worse += 1;
                 assert!(!is_written, "{context}");
-                let names_lens = verdict.reasons.iter().any(|reason| reason.contains("lens distorts"));
-                assert!(names_lens || verdict.status == Judgement::Fail, "{context}");
+                let names = |words: &str| verdict.reasons.iter().any(|reason| reason.contains(words));
+                // A slight distortion is a scale error in first degree, which is the simpler explanation and as well the sensor's.
+                let names_sensor = names("lens distorts") || names("a sensor that reads");
+                assert!(names_sensor || verdict.status == Judgement::Fail, "{context}");
+                put_down_to_lens += usize::from(names("lens distorts"));
             }
         }
     }
     assert!(worse > 2, "the lens must be one that misleads: {worse} of 10");
+    assert!(2 * put_down_to_lens > worse, "{put_down_to_lens} of {worse} are put down to the lens");
 }
