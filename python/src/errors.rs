@@ -243,7 +243,9 @@ impl From<RobotError> for Refusal {
     fn from(error: RobotError) -> Self {
         let told = Self::new(Kind::Robot, &error);
         match error {
-            RobotError::Unknown { name, known, .. } => Self { found: Some(name), expected: Some(known), ..told },
+            RobotError::Unknown { name, known, .. } => {
+                Self { found: Some(name), expected: Some(known), ..told }
+            }
             RobotError::Syntax { file, line, found, message, .. } => Self {
                 file: Some(file),
                 row: Some(line),
