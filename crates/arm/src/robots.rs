@@ -20,6 +20,7 @@ use std::sync::OnceLock;
 
 use crate::model::Model;
 use sheet::{DataSheet, RobotFile};
+use truegrind_math::toml_text::{self, TomlError};
 
 pub use error::{NominalMismatch, RobotError};
 
@@ -74,7 +75,8 @@ fn shipped(index: usize) -> Result<&'static RobotFile, RobotError> {
         return Ok(content);
     }
     let (file, text) = FILES[index];
-    let content = read(text, file)?;
+    // That no array of it is too long is for a test to say, not for every start.
+    let content = toml::from_str(text).map_err(|error| syntax(&error.into(), text, file))?;
     Ok(READ[index].get_or_init(|| content))
 }
 
@@ -192,17 +194,19 @@ pub fn to_toml(robot: &Robot) -> Result<String, String> {
 
 /// The sheets of a file, as written: keys and types are right, values are not yet checked.
 fn read(text: &str, file: &str) -> Result<RobotFile, RobotError> {
-    truegrind_math::toml_text::read(text).map_err(|error| {
-        let start = error.span().map_or(0, |span| span.start).min(text.len());
-        let before = text.get(..start).unwrap_or_default();
-        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
-        let found = text.get(line_start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
-        RobotError::Syntax {
-            file: file.to_owned(),
-            line: before.matches('\n').count() + 1,
-            column: before.get(line_start..).unwrap_or_default().chars().count() + 1,
-            found: found.trim().to_owned(),
-            message: error.message().replace('\n', " "),
-        }
-    })
+    toml_text::read(text).map_err(|error| syntax(&error, text, file))
+}
+
+fn syntax(error: &TomlError, text: &str, file: &str) -> RobotError {
+    let start = error.span().map_or(0, |span| span.start).min(text.len());
+    let before = text.get(..start).unwrap_or_default();
+    let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+    let found = text.get(line_start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
+    RobotError::Syntax {
+        file: file.to_owned(),
+        line: before.matches('\n').count() + 1,
+        column: before.get(line_start..).unwrap_or_default().chars().count() + 1,
+        found: found.trim().to_owned(),
+        message: error.message().replace('\n', " "),
+    }
 }

@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 use truegrind_arm::link::LinkModel;
-use truegrind_arm::robots::sheet::{Angles, Dialect, LinkSheet, Orientation};
+use truegrind_arm::robots::sheet::{Angles, Dialect, LinkSheet, Orientation, RobotFile};
 use truegrind_arm::robots::validation::deviation;
 use truegrind_arm::robots::{Robot, RobotError, catalogue, load, parse};
+use truegrind_math::toml_text;
 
 const ABB: &str = include_str!("../../src/robots/abb.toml");
 
@@ -32,6 +33,19 @@ fn the_catalogue_has_the_arms_asked_for_and_each_loads() {
         assert_eq!(robot.warnings.len(), expected, "{}: {:?}", robot.sheet.name, robot.warnings);
         assert_eq!(load(&robot.sheet.name.to_uppercase()).unwrap().sheet, robot.sheet);
     }
+}
+
+/// A start does not look for it.
+#[test]
+fn no_array_of_the_catalogue_is_longer_than_its_field() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/robots");
+    let files = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
+    let texts = files.filter(|path| path.extension().is_some_and(|end| end == "toml"));
+    let read = texts.map(|path| {
+        let text = std::fs::read_to_string(&path).unwrap();
+        toml_text::read::<RobotFile>(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    });
+    assert_eq!(read.map(|file| file.robot.len()).sum::<usize>(), catalogue().len());
 }
 
 #[test]
