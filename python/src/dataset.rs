@@ -155,12 +155,13 @@ impl PyDataset {
     /// Rows from arrays: logged controller angles (°) of shape (N, 6), and the readings of one sensor: ``length_mm`` (N,) of a
     /// cable, ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. Optional: Cartesian readout of the
     /// controller ``readout_mm`` (N, 3), ``time_h``, ``temperature_c`` and ``payload_kg`` (N,), approach directions (N, 6) in
-    /// −1, 0, 1, number of the cable outlet ``anchor`` (N,), ``session`` labels. NaN means unknown.
+    /// −1, 0, 1, number of the cable outlet ``anchor`` (N,), labels ``session`` and
+    /// ``station``, where tracker or camera stood. NaN means unknown.
     #[staticmethod]
     #[pyo3(signature = (
         q_deg, *, length_mm = None, position_mm = None, quaternion_wxyz = None, readout_mm = None, time_h = None,
-        temperature_c = None, payload_kg = None, approach = None, anchor = None, session = None, name = "numpy",
-        allow_odd_units = false
+        temperature_c = None, payload_kg = None, approach = None, anchor = None, session = None, station = None,
+        name = "numpy", allow_odd_units = false
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords, each with its own unit")]
     fn from_numpy<'py>(
@@ -176,6 +177,7 @@ impl PyDataset {
         approach: Option<Object<'py, ArrayLike>>,
         anchor: Option<Object<'py, ArrayLike>>,
         session: Option<Vec<Option<String>>>,
+        station: Option<Vec<Option<String>>>,
         name: &str,
         allow_odd_units: bool,
     ) -> PyResult<Self> {
@@ -200,8 +202,8 @@ impl PyDataset {
             let Some(array) = array else { continue };
             add(&mut columns, argument, &numbers(argument, &array)?, names, gaps)?;
         }
-        if let Some(session) = session {
-            columns.push(("session".to_owned(), Column::Texts(session)));
+        for (name, labels) in [("session", session), ("station", station)] {
+            columns.extend(labels.map(|labels| (name.to_owned(), Column::Texts(labels))));
         }
         of_columns(py, name, columns, allow_odd_units)
     }

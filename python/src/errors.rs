@@ -6,6 +6,7 @@ use truegrind::arm::estimated;
 use truegrind::calibration::identification::start::StartError;
 use truegrind::calibration::measurement::matching::Mismatch;
 use truegrind::calibration::measurement::plausibility::PayloadSuspicion;
+use truegrind::calibration::measurement::stations::StationError;
 use truegrind::compensation::cell::CellError;
 use truegrind::{
     CompensateError, IdentifyError, ImportError, ModelFileError, NominalMismatch, PlanError, RecipeError,
@@ -227,6 +228,9 @@ impl From<Mismatch> for Refusal {
                 let message = format!("{} (allow_odd_units=True takes the rows at their word)", told.message);
                 told.saying(message)
             }
+            Mismatch::Station(StationError { file, rows, .. }) => told
+                .of_file(&file)
+                .with(format!("{rows} rows"), "at least four poses from each station, not on a line"),
             _ => told,
         }
     }

@@ -110,12 +110,13 @@ class Dataset:
         and so on; nulls are empty cells.
         """
     @staticmethod
-    def from_numpy(q_deg: ArrayLike, *, length_mm: ArrayLike | None = None, position_mm: ArrayLike | None = None, quaternion_wxyz: ArrayLike | None = None, readout_mm: ArrayLike | None = None, time_h: ArrayLike | None = None, temperature_c: ArrayLike | None = None, payload_kg: ArrayLike | None = None, approach: ArrayLike | None = None, anchor: ArrayLike | None = None, session: SupportsGetItem[int, str | None] | None = None, name: str = "numpy", allow_odd_units: bool = False) -> Dataset:
+    def from_numpy(q_deg: ArrayLike, *, length_mm: ArrayLike | None = None, position_mm: ArrayLike | None = None, quaternion_wxyz: ArrayLike | None = None, readout_mm: ArrayLike | None = None, time_h: ArrayLike | None = None, temperature_c: ArrayLike | None = None, payload_kg: ArrayLike | None = None, approach: ArrayLike | None = None, anchor: ArrayLike | None = None, session: SupportsGetItem[int, str | None] | None = None, station: SupportsGetItem[int, str | None] | None = None, name: str = "numpy", allow_odd_units: bool = False) -> Dataset:
         """
         Rows from arrays: logged controller angles (°) of shape (N, 6), and the readings of one sensor: ``length_mm`` (N,) of a
         cable, ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. Optional: Cartesian readout of the
         controller ``readout_mm`` (N, 3), ``time_h``, ``temperature_c`` and ``payload_kg`` (N,), approach directions (N, 6) in
-        −1, 0, 1, number of the cable outlet ``anchor`` (N,), ``session`` labels. NaN means unknown.
+        −1, 0, 1, number of the cable outlet ``anchor`` (N,), labels ``session`` and
+        ``station``, where tracker or camera stood. NaN means unknown.
         """
     @staticmethod
     def from_xlsx(source: str | PathLike[str] | bytes, *, sheet: str | None = None, name: str | None = None, allow_odd_units: bool = False) -> Dataset:

@@ -62,6 +62,9 @@ pub(super) fn expect(path: &Path) -> anyhow::Result<()> {
 }
 
 fn open(path: &Path) -> anyhow::Result<(fs::File, fs::Metadata)> {
+    if path.is_dir() {
+        bail!("{}: is a folder, and one file is expected here: name the file in it", path.display());
+    }
     let try_open = || {
         let file = fs::File::open(path)?;
         let meta = file.metadata()?;

@@ -11,13 +11,14 @@ use truegrind::calibration::identification::stated_frame::{
 };
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
+use truegrind::calibration::measurement::stations;
 use truegrind::math::se3::Pose;
 
 /// Pose of the sensor, if known. Without [`FramePriorArguments`] it serves for the raw error only, and the fit determines the
 /// frames.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct StatedFrameArguments {
-    /// Frame of a position or pose sensor in the robot base: x,y,z (mm) or x,y,z,qw,qx,qy,qz.
+    /// Frame of a position or pose sensor in the robot base: x,y,z (mm) or x,y,z,qw,qx,qy,qz; of several stations that of the first row.
     #[arg(long, value_name = "X,Y,Z[,Q…]", allow_hyphen_values = true)]
     sensor_frame: Option<String>,
     /// Outlet of a draw-wire cable in the robot base: x,y,z (mm). Once per cable, in the order of the column `anchor`.
@@ -177,7 +178,8 @@ impl StatedFrameArguments {
     /// The frames do not match the sensor of the data.
     pub(super) fn frames(&self, dataset: &Dataset) -> anyhow::Result<Option<Frames>> {
         let measured = Measured { file: &dataset.file, sensor: dataset.sensor, anchors: dataset.anchors() };
-        self.frames_of(&measured)
+        let disturbances = stations::disturbances(dataset.stations());
+        Ok(self.frames_of(&measured)?.map(|frames| Frames { disturbances, ..frames }))
     }
 
     /// The stated point on the flange, if any.

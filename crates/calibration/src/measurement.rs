@@ -20,6 +20,7 @@ mod reach;
 mod row_list;
 pub mod sensor;
 pub mod registration;
+pub mod stations;
 pub mod repeated_poses;
 pub mod noise_floor;
 pub mod split;

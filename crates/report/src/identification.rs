@@ -151,8 +151,8 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
         "identifiability": identifiability,
         "sharpening": words::readout_fusion_json(found),
         "outliers": {
-            "rows": found.outliers.rows.iter().map(|(index, size)| json!({
-                "row": row_number(dataset, *index), "robust_sigmas": size,
+            "rows": found.outliers.rows.iter().map(|row| json!({
+                "row": row_number(dataset, row.index), "robust_sigmas": row.robust_sigmas, "error_mm": row.error_mm.abs(),
             })).collect::<Vec<_>>(),
             "too_many": found.outliers.too_many,
         },
@@ -229,14 +229,14 @@ pub fn judged(estimated: &Estimated) -> Verdict {
             (Status::Warning, format!("The model is doubtful and needs --allow-doubtful: {errors}"))
         }
         Judgement::NotEvaluated => (
-            Status::NotEvaluated,
+            Status::Good,
             format!(
-                "No limits were stated (--limit-rmse, --limit-max); nothing else speaks against the model: {errors}"
+                "The model may be used; no limit of its error was stated (--limit-rmse, --limit-max): {errors}"
             ),
         ),
     };
     let mut reasons = estimated.verdict.reasons.clone();
-    if matches!(status, Status::Good | Status::NotEvaluated) {
+    if status == Status::Good {
         // The headline says what limits were stated, and an arm that may be used has converged.
         reasons.retain(|reason| !reason.ends_with(CONVERGED) && reason != NO_LIMITS);
         reasons.push(
@@ -306,7 +306,8 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
             used - found.held_out.len().min(used),
             found.held_out.len()
         )),
-        KeyFigure::new("Set aside", estimated.provenance.set_aside.len(), 0, "").note("gross outliers"),
+        KeyFigure::new("Set aside", estimated.provenance.set_aside.len(), 0, "")
+            .note(words::set_aside(found)),
         KeyFigure::new("Rank", rank.map(|r| format!("{} of {}", r.rank, r.parameters)), 0, "").note(
             match rank {
                 Some(report) => {

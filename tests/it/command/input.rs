@@ -302,10 +302,19 @@ fn a_mistake_that_explains_tracker_readings_is_named() {
     }
     short.pop();
     refused(&written(&short), &["from row 82 on", "a reading is missing"]);
-    // The tracker was set up elsewhere for the second half.
-    let mut sessions = owned;
-    sessions[0].push("session".to_owned());
-    for (number, row) in sessions.iter_mut().enumerate().skip(1) {
+    refused(
+        &written(&set_up_elsewhere("session")),
+        &["week 1 and week 2", "column station", "a file of its own"],
+    );
+}
+
+/// A tracker that was set up elsewhere for the second half, which the column of this name tells.
+fn set_up_elsewhere(column: &str) -> Vec<Vec<String>> {
+    let text = include_str!("../../data/irb120-tracker.csv");
+    let mut rows: Vec<Vec<String>> =
+        text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect();
+    rows[0].push(column.to_owned());
+    for (number, row) in rows.iter_mut().enumerate().skip(1) {
         let second = number > 100;
         if second {
             let x: f64 = row[6].parse().unwrap();
@@ -314,7 +323,35 @@ fn a_mistake_that_explains_tracker_readings_is_named() {
         }
         row.push(if second { "week 2" } else { "week 1" }.to_owned());
     }
-    refused(&written(&sessions), &["week 1 and week 2", "a file of its own"]);
+    rows
+}
+
+/// What a column `station` tells is fitted: the arm of both places is that of one.
+#[test]
+fn stations_of_a_tracker_are_fitted_together() {
+    let dir = folder();
+    let at = dir.path();
+    let rows = set_up_elsewhere("station");
+    let text: String = rows.iter().map(|row| row.join(",") + "\n").collect();
+    fs::write(at.join("two.csv"), text).unwrap();
+    fs::write(at.join("one.csv"), include_str!("../../data/irb120-tracker.csv")).unwrap();
+    let identified = |file: &str| {
+        let arguments = ["identify", file, "--robot", "abb-irb-120", "--json", "found.json"];
+        let (code, out, err) = truegrind(at, &arguments);
+        assert_eq!(code, 0, "{out}{err}");
+        let json: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(at.join("found.json")).unwrap()).unwrap();
+        fs::remove_file(at.join("found.json")).unwrap();
+        (err, json)
+    };
+    let (_, one) = identified("one.csv");
+    let (notes, two) = identified("two.csv");
+    assert!(notes.contains("2 stations with 100 and 100 rows"), "{notes}");
+    let rmse = |of: &serde_json::Value| of["stages"]["geometry"]["held_out"]["rmse"].as_f64().unwrap();
+    assert!(rmse(&two) < 1.1 * rmse(&one), "{} {}", rmse(&two), rmse(&one));
+    let names: Vec<&str> =
+        two["frames"].as_array().unwrap().iter().filter_map(|p| p["name"].as_str()).collect();
+    assert!(names.contains(&"station2.x"), "{names:?}");
 }
 
 #[test]

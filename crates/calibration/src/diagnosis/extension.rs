@@ -35,7 +35,7 @@ pub struct Subject<'a> {
     pub observed: &'a Observations,
     /// The data sheet's arm.
     pub nominal: &'a Model,
-    /// Starting frames, without disturbances.
+    /// Starting frames, without disturbances other than further stations.
     pub frames: &'a Frames,
     /// Priors of links and frames.
     pub tolerance: &'a Tolerance,
@@ -450,7 +450,7 @@ pub(super) fn with_robust_weights(weights: &[Weight], robust_weight: &[f64]) -> 
 /// The causes with their fitted values.
 pub(super) fn filled(causes: &[Cause], model: &Model, frames: &Frames) -> Vec<Cause> {
     let first = model.effects.len() - causes.iter().filter(|c| matches!(c, Cause::Arm(_))).count();
-    let (mut effect, mut disturbance) = (first, 0);
+    let (mut effect, mut disturbance) = (first, frames.further_stations());
     causes
         .iter()
         .map(|cause| match cause {
@@ -516,13 +516,13 @@ impl Extended {
         let arm = matches!(self.causes[index], Cause::Arm(_));
         let before = self.causes[..index].iter().filter(|c| matches!(c, Cause::Arm(_)) == arm).count();
         let own = self.causes.iter().filter(|c| matches!(c, Cause::Arm(_))).count();
-        let first = if arm { self.model.effects.len() - own } else { 0 };
+        let first = if arm { self.model.effects.len() - own } else { self.frames.further_stations() };
         self.parameters
             .iter()
             .enumerate()
             .filter(|(_, p)| match **p {
                 Parameter::Effect { index, .. } => arm && index == first + before,
-                Parameter::Disturbance { index, .. } => !arm && index == before,
+                Parameter::Disturbance { index, .. } => !arm && index == first + before,
                 _ => false,
             })
             .map(|(k, _)| k)

@@ -58,10 +58,15 @@ pub(super) fn representable_causes(causes: &[Cause], accepted: &[Accepted]) -> V
 
 /// The arm of `written_model` extended by the further causes of `with` at size 0, with the covariance of the module documentation.
 pub(super) fn with_zero_causes(written: &Extended, with: Extended) -> Extended {
+    let stations = written.frames.further_stations();
+    let is_of_cause = |p: &Parameter| match *p {
+        Parameter::Disturbance { index, .. } => index >= stations,
+        _ => p.is_of_cause(),
+    };
     let mut from: Vec<Option<usize>> = with
         .parameters
         .iter()
-        .map(|p| written.parameters.iter().position(|q| q == p).filter(|_| !p.is_of_cause()))
+        .map(|p| written.parameters.iter().position(|q| q == p).filter(|_| !is_of_cause(p)))
         .collect();
     for (k, cause) in with.causes.iter().enumerate() {
         let same = written.causes.iter().position(|other| contains_cause(std::slice::from_ref(other), cause));

@@ -27,7 +27,7 @@ use truegrind_estimation::problem::{Prior, Problem};
 use truegrind_math::statistics::{ErrorSummary, median};
 use truegrind_math::work::checkpoint;
 
-/// Parameters of the measurement: frame, outlet, zero, target.
+/// Parameters of the measurement: frame, outlet, zero, target, and how each further station stands to the first.
 pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
     let target = if dataset.sensor == Sensor::Pose { 6 } else { 3 };
     let mut out: Vec<Parameter> = (0..target).map(Parameter::Target).collect();
@@ -38,7 +38,12 @@ pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
                 out.push(Parameter::Zero { anchor });
             }
         }
-        Sensor::Position | Sensor::Pose => out.extend((0..6).map(Parameter::SensorFrame)),
+        Sensor::Position | Sensor::Pose => {
+            out.extend((0..6).map(Parameter::SensorFrame));
+            for index in 1..dataset.stations() {
+                out.extend((0..6).map(|parameter| Parameter::Disturbance { index: index - 1, parameter }));
+            }
+        }
     }
     out
 }
@@ -273,17 +278,28 @@ fn noise_sigmas(
     (mm, rad)
 }
 
+/// A row rejected as a gross outlier.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outlier {
+    /// Its index in the data set.
+    pub index: usize,
+    /// Its residual of the robust fit of geometry, in robust standard deviations.
+    pub robust_sigmas: f64,
+    /// The same (mm).
+    pub error_mm: f64,
+}
+
 /// Rows rejected as gross outliers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Outliers {
-    /// Index into the data set and residual in robust standard deviations, largest first.
-    pub rows: Vec<(usize, f64)>,
+    /// Largest first.
+    pub rows: Vec<Outlier>,
     /// Rows beyond the cut, if there were too many to be outliers and none was rejected.
     pub too_many: usize,
 }
 
 /// A row is an outlier beyond this many robust standard deviations of a geometry fit.
-const OUTLIER_CUT: f64 = 10.0;
+pub const OUTLIER_CUT: f64 = 10.0;
 
 /// Largest share of rejected rows: more is a systematic effect.
 const OUTLIER_SHARE: f64 = 0.1;
@@ -311,7 +327,7 @@ pub fn outliers(
     let mut factor = vec![1.0; dataset.rows.len()];
     let mut x = vec![0.0; parameters.len()];
     let (mut model, mut frames) = (start.model.clone(), start.frames.clone());
-    let mut scaled = vec![0.0; dataset.rows.len()];
+    let (mut scaled, mut errors) = (vec![0.0; dataset.rows.len()], Vec::new());
     let mut sigma = 0.1;
     let consistency = sigma_per_median(dataset.sensor);
     let mut before: Option<CalibrationProblem> = None;
@@ -339,7 +355,7 @@ pub fn outliers(
             .fold(0.0, f64::max);
         x = estimate.x;
         (model, frames) = problem.apply(&x);
-        let errors = problem.errors_mm(&x);
+        errors = problem.errors_mm(&x);
         let sizes: Vec<f64> = errors.iter().zip(&base).map(|(e, w)| e.abs() * w.per_mm).collect();
         let spread = (median(&sizes).unwrap_or(1.0) * consistency).max(1e-9);
         scaled = sizes.iter().map(|s| s / spread).collect();
@@ -356,14 +372,19 @@ pub fn outliers(
     if few.is_some() {
         // Fitted to the subsample, applied to all rows.
         let base = rounding::weights(&all.dataset, &model, &frames, &all.angles, sigma, 1e-3);
-        let errors = errors_on(all, &model, &frames);
+        errors = errors_on(all, &model, &frames);
         let sizes: Vec<f64> = errors.iter().zip(&base).map(|(e, w)| e.abs() * w.per_mm).collect();
         let spread = (median(&sizes).unwrap_or(1.0) * consistency).max(1e-9);
         scaled = sizes.iter().map(|s| s / spread).collect();
     }
-    let mut rows: Vec<(usize, f64)> =
-        scaled.iter().copied().enumerate().filter(|(_, s)| !(*s <= OUTLIER_CUT)).collect();
-    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let of_row = |(index, (robust_sigmas, error_mm)): (usize, (&f64, &f64))| Outlier {
+        index,
+        robust_sigmas: *robust_sigmas,
+        error_mm: *error_mm,
+    };
+    let mut rows: Vec<Outlier> = scaled.iter().zip(&errors).enumerate().map(of_row).collect();
+    rows.retain(|row| !(row.robust_sigmas <= OUTLIER_CUT));
+    rows.sort_by(|a, b| b.robust_sigmas.total_cmp(&a.robust_sigmas));
     if rows.len() as f64 > OUTLIER_SHARE * n as f64 {
         return Outliers { too_many: rows.len(), rows: Vec::new() };
     }

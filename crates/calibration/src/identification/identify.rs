@@ -8,8 +8,8 @@ use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
-    Fitted, Observations, Outliers, Start, WRONG_ORIENTATION_RAD, errors_on, fit, frame_parameters,
-    median_orientation_error, orientation_errors, outliers, summary_on,
+    Fitted, OUTLIER_CUT, Observations, Outliers, Start, WRONG_ORIENTATION_RAD, errors_on, fit,
+    frame_parameters, median_orientation_error, orientation_errors, outliers, summary_on,
 };
 use crate::identification::identifiability::Identifiability;
 use crate::identification::inflation::inflation_from_rows;
@@ -369,7 +369,7 @@ fn provenance(
         file: dataset.file.clone(),
         sha256: dataset.sha256.clone(),
         rows: observed.dataset.rows.len(),
-        set_aside: outliers.rows.iter().map(|(i, _)| dataset.rows[*i].number).collect(),
+        set_aside: outliers.rows.iter().map(|row| dataset.rows[row.index].number).collect(),
         sensor: dataset.sensor,
         method: options.solver.name.to_owned(),
         seed: options.seed,
@@ -386,7 +386,7 @@ fn without(observed: Observations, outliers: &Outliers) -> Observations {
     }
     let rows = observed.dataset.rows.len();
     let mut set_aside = vec![false; rows];
-    outliers.rows.iter().for_each(|(i, _)| set_aside[*i] = true);
+    outliers.rows.iter().for_each(|row| set_aside[row.index] = true);
     let kept: Vec<usize> = (0..rows).filter(|&i| !set_aside[i]).collect();
     observed.subset(&kept)
 }
@@ -553,7 +553,7 @@ pub(crate) fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<Estimated
                 _ => parameter.unit(),
             };
             EstimatedParameter {
-                name: parameter.to_string(),
+                name: name_of(*parameter, &fitted.frames),
                 unit: unit.to_owned(),
                 nominal: nominal_value,
                 value,
@@ -563,6 +563,17 @@ pub(crate) fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<Estimated
             }
         })
         .collect()
+}
+
+/// The name of a parameter in tables; that of a further station tells which.
+fn name_of(parameter: Parameter, frames: &Frames) -> String {
+    match parameter {
+        Parameter::Disturbance { index, parameter } if index < frames.further_stations() => {
+            let coordinate = Parameter::SensorFrame(parameter).to_string();
+            coordinate.replacen("sensor", &format!("station{}", index + 2), 1)
+        }
+        _ => parameter.to_string(),
+    }
 }
 
 pub(crate) fn arm_parameters_of(fitted: &Fitted) -> Vec<Parameter> {
@@ -684,7 +695,7 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     }
     if case.outliers.too_many > 0 {
         verdict.note(format!(
-            "{} rows lie beyond ten robust standard deviations, too many to be outliers: none was rejected",
+            "{} rows lie beyond {OUTLIER_CUT} robust standard deviations, too many to be outliers: none was rejected",
             case.outliers.too_many
         ));
     }

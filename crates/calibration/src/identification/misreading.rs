@@ -22,7 +22,7 @@ const FEWEST: usize = 8;
 pub(crate) fn advice(explanation: Option<&str>) -> String {
     match explanation {
         Some(explanation) => format!(": {explanation}"),
-        None => ": check that --robot is the measured arm, that the sensor stayed where it was (each set-up is a file of its own), that no two \
+        None => ": check that --robot is the measured arm, that the sensor stayed where it was (a column station names its places), that no two \
                  columns are swapped, that lengths are in mm and angles in degrees, and try --angles dh"
             .to_owned(),
     }
@@ -77,7 +77,8 @@ impl Case<'_> {
         };
         (names.len() > 1 && names.iter().all(fits)).then(|| {
             format!(
-                "each session ({}) fits by itself, but sensor or target moved between them: put each into a file of its own",
+                "each session ({}) fits by itself, but sensor or target moved between them: if it was the sensor, copy column session to a \
+                 column station; if it was the target, put each session into a file of its own",
                 listed(&names)
             )
         })

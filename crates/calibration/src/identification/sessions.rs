@@ -71,7 +71,7 @@ pub(super) fn set_up_anew(dataset: &Dataset, fitted: &Fitted) -> Option<String> 
         |session: &str| if session.is_empty() { "without a name".to_owned() } else { session.to_owned() };
     Some(format!(
         "the readings of sessions {} and {} differ by {mm:.3} mm in the mean with one sensor frame and one target for both: sensor or \
-         target was moved. Identify each session alone, or let `diagnose` find what moved",
+         target was moved. If the sensor was set up elsewhere, say so in a column station; otherwise let `diagnose` find what moved",
         name(a.0),
         name(b.0)
     ))

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::identification::calibration::Frames;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
-use crate::measurement::registration;
+use crate::measurement::{registration, stations};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_math::se3::Pose;
@@ -54,7 +54,10 @@ pub fn candidate_frames(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames
         return Err(none(what, needed));
     }
     let flanges = flanges(dataset, nominal);
-    let mut frames = Frames::at_origin(dataset.anchors());
+    let mut frames = Frames {
+        disturbances: stations::disturbances(dataset.stations()),
+        ..Frames::at_origin(dataset.anchors())
+    };
     match dataset.sensor {
         Sensor::Cable => {
             let mut rival: Option<Frames> = None;

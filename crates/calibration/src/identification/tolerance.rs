@@ -4,7 +4,7 @@
 
 use crate::identification::calibration::Frames;
 use crate::measurement::registration::TARGET_SIGMA_MM;
-use crate::measurement::sensor::disturbance::{Disturbance, Kind};
+use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
@@ -75,6 +75,11 @@ impl Tolerance {
     /// Standard deviation of a parameter of a disturbance, in its unit: a wide prior from sizes met in practice.
     pub fn of_disturbance(disturbance: &Disturbance, parameter: usize) -> f64 {
         match &disturbance.kind {
+            // A station may stand anywhere.
+            _ if matches!(disturbance.profile, Profile::Station { .. }) => {
+                let anywhere = Self::default();
+                if parameter >= 3 { anywhere.frame_rad } else { anywhere.frame_mm }
+            }
             Kind::Zero | Kind::Target => 5.0,
             Kind::Frame { .. } if parameter >= 3 => 5e-3,
             Kind::Frame { .. } => 5.0,

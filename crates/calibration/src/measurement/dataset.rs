@@ -54,8 +54,17 @@ impl Dataset {
         Self { rows: self.rows.select(indices), ..self.clone() }
     }
 
-    /// Number of cable outlets.
+    /// Number of cable outlets; 1 without a cable.
     pub fn anchors(&self) -> usize {
+        if self.sensor == Sensor::Cable { self.places() } else { 1 }
+    }
+
+    /// Number of stations of a tracker or camera; 1 for cables.
+    pub fn stations(&self) -> usize {
+        if self.sensor == Sensor::Cable { 1 } else { self.places() }
+    }
+
+    fn places(&self) -> usize {
         self.rows.iter().map(|r| r.anchor + 1).max().unwrap_or(1)
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Columns are found by header name, in any order: `q1…q6` logged joint angles (deg); one sensor, `L` (mm) or
 //! `measured_x, measured_y, measured_z` (mm) (with `measured_qw … measured_qz` a full pose); optional `x, y, z` (mm),
-//! `t` (h), `session`, `temperature` [°C], `payload` (kg), `approach1…6`, `anchor`, and `path, cycle, sample` of rows that were read
+//! `t` (h), `session`, `temperature` [°C], `payload` (kg), `approach1…6`, `anchor` or `station`, and `path, cycle, sample` of rows that were read
 //! on a path. Other columns are kept as text.
 //! Tables of RoboDK and DELMIA are recognised by their content (see the notes of the dataset).
 //! CSV fields are separated by comma, semicolon or tab; with semicolon or tab, decimal commas are accepted. Of a workbook,

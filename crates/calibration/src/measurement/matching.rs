@@ -1,6 +1,8 @@
 //! Checks a measurement file against the arm that was measured, converts its angles to the controller's, leaves out copied rows and brings
 //! the others into the order of measuring.
 
+use std::borrow::Cow;
+
 use thiserror::Error;
 
 use super::axis_range::note_joints_out_of_range;
@@ -12,6 +14,7 @@ use super::plausibility::{
     ComparedReading, UnitSuspicion, implausible_temperature, implausible_time, plausibility,
 };
 use super::reach::without_impossible_readings;
+use super::stations::{StationError, in_frame_of_first, rows_of_stations};
 use truegrind_arm::model::Model;
 
 /// Why a measurement file does not match an arm.
@@ -30,9 +33,13 @@ pub enum Mismatch {
         /// The arm.
         robot: String,
     },
+    /// A station of the tracker cannot be placed.
+    #[error(transparent)]
+    Station(#[from] StationError),
 }
 
-/// The rows with the controller's angles, in the order of measuring and without copies. `convention` states what the file's angles are;
+/// The rows with the controller's angles, in the order of measuring, without copies and with the readings of all stations in the frame of the
+/// first. `convention` states what the file's angles are;
 /// `allow_odd_units` skips the check of units. An implausible read-out of the controller is only noted, since no fit needs it.
 ///
 /// # Errors
@@ -49,7 +56,7 @@ pub fn match_to_arm(
             return Err(Mismatch::Condition(why));
         }
         without_impossible_readings(&mut dataset, nominal);
-        for suspicion in plausibility(&dataset, nominal, convention) {
+        for suspicion in plausibility(&of_largest_station(&dataset), nominal, convention) {
             match suspicion.compared {
                 ComparedReading::Sensor => return Err(Mismatch::Units(Box::new(suspicion))),
                 ComparedReading::Readout => dataset.notes.push(suspicion.to_string()),
@@ -60,5 +67,15 @@ pub fn match_to_arm(
     let mut dataset =
         convention.apply(dataset, nominal).ok_or_else(|| Mismatch::JointMap { robot: robot.to_owned() })?;
     note_joints_out_of_range(&mut dataset, &nominal.limits);
+    in_frame_of_first(&mut dataset, nominal)?;
     Ok(dataset)
+}
+
+/// The rows of the station with the most rows, all of which are in one frame.
+fn of_largest_station(dataset: &Dataset) -> Cow<'_, Dataset> {
+    if dataset.stations() < 2 {
+        return Cow::Borrowed(dataset);
+    }
+    let rows = rows_of_stations(dataset).into_iter().max_by_key(Vec::len).unwrap_or_default();
+    Cow::Owned(dataset.subset(&rows))
 }

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::dataset::Dataset;
 use super::row_list::row_list;
+use super::stations::rows_of_stations;
 use truegrind_arm::model::Model;
 use truegrind_math::statistics::median;
 
@@ -21,16 +22,21 @@ pub(super) fn without_impossible_readings(dataset: &mut Dataset, nominal: &Model
     let length: f64 = nominal.links.iter().map(|link| link.a_mm.hypot(link.d_mm)).sum();
     let diameter_mm = 2.0 * (length + nominal.flange.translation.vector.norm() + TOOL_MM);
     let places: Vec<Vector3<f64>> = dataset.rows.iter().map(|row| row.reading.place_mm()).collect();
-    let middle = Vector3::from_fn(|axis, _| {
-        median(&places.iter().map(|place| place[axis]).collect::<Vec<_>>()).unwrap_or_default()
-    });
-    let is_possible = |i: &usize| (places[*i] - middle).norm() <= diameter_mm;
+    // Readings of two stations are in two frames.
+    let mut from_middle_mm = vec![0.0; places.len()];
+    for rows in rows_of_stations(dataset) {
+        let middle = Vector3::from_fn(|axis, _| {
+            median(&rows.iter().map(|&row| places[row][axis]).collect::<Vec<_>>()).unwrap_or_default()
+        });
+        rows.iter().for_each(|&row| from_middle_mm[row] = (places[row] - middle).norm());
+    }
+    let is_possible = |i: &usize| from_middle_mm[*i] <= diameter_mm;
     let (kept, left_out): (Vec<usize>, Vec<usize>) = (0..places.len()).partition(is_possible);
     if left_out.is_empty() || left_out.len() as f64 > MOST * places.len() as f64 {
         return;
     }
     let numbers: Vec<usize> = left_out.iter().map(|&i| dataset.rows[i].number).collect();
-    let farthest = left_out.iter().map(|&i| (places[i] - middle).norm()).fold(0.0, f64::max);
+    let farthest = left_out.iter().map(|&i| from_middle_mm[i]).fold(0.0, f64::max);
     *dataset = dataset.subset(&kept);
     dataset.notes.push(format!(
         "{} left out: {} {farthest:.0} mm from the median of all, and this arm reaches {diameter_mm:.0} mm at most; a sensor that is \

@@ -42,6 +42,16 @@ pub enum TrackError {
         /// RMS residual that another geometry leaves, if it explains the poses (mm).
         changed_mm: Option<f64>,
     },
+    /// Readings from several places.
+    #[error(
+        "{file}: a track follows one set-up of the sensor, and this file has {stations} stations (column station): one track for each, in a file of its own"
+    )]
+    Stations {
+        /// File.
+        file: String,
+        /// Stations there are.
+        stations: usize,
+    },
     /// Another sensor than before.
     #[error(
         "{file}: has {found} readings, the track so far has {expected}: start a new track with another --state"

@@ -84,6 +84,14 @@ pub struct PoseUpdate {
     pub set_aside: bool,
 }
 
+/// One frame of the sensor is followed.
+fn refuse_stations(dataset: &Dataset) -> Result<(), TrackError> {
+    match dataset.stations() {
+        1 => Ok(()),
+        stations => Err(TrackError::Stations { file: dataset.file.clone(), stations }),
+    }
+}
+
 impl Tracker {
     /// Registers the sensor with the first poses of `dataset`; no pose is filtered yet.
     ///
@@ -95,6 +103,7 @@ impl Tracker {
         dataset: &Dataset,
         options: &Options,
     ) -> Result<Self, TrackError> {
+        refuse_stations(dataset)?;
         if dataset.rows.len() < options.first_poses {
             return Err(TrackError::TooFew {
                 file: dataset.file.clone(),
@@ -191,6 +200,7 @@ impl Tracker {
                 expected: self.state.sensor.name(),
             });
         }
+        refuse_stations(dataset)?;
         let done = self.state.consumed.iter().position(|c| c.file == dataset.file);
         let from = done.map_or(0, |at| self.state.consumed[at].rows);
         if let Some(at) = done {

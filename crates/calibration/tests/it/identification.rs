@@ -6,5 +6,6 @@ mod prior_width;
 mod promise;
 mod sensor_laws;
 mod stated_frame;
+mod stations;
 pub(crate) mod unseen_target;
 mod verdict;

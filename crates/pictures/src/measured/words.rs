@@ -110,7 +110,7 @@ fn verdict(text: &mut String, found: &Identification) {
         Judgement::Pass => "pass",
         Judgement::Fail => "FAIL",
         Judgement::Doubtful => "doubtful",
-        Judgement::NotEvaluated => "not evaluated",
+        Judgement::NotEvaluated => "may be used; no limit of its error was stated",
     };
     let method = line(&found.estimated.provenance.method);
     let _ = writeln!(text, "Method: **{method}**. Verdict: **{status}**.\n");

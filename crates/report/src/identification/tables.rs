@@ -4,6 +4,7 @@ use super::parameter::{handy, held_by_prior};
 use crate::status::Status;
 use crate::table::{Cell, Column, Table};
 use truegrind_arm::estimated::EstimatedParameter;
+use truegrind_calibration::identification::fit::{OUTLIER_CUT, Outlier};
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::solver;
@@ -210,22 +211,24 @@ pub(super) fn by_row(found: &Identification) -> Vec<(usize, f64, f64)> {
     rows
 }
 
-/// Rows that were set aside, with their size in robust standard deviations.
+/// Rows that were set aside, with their errors.
 pub fn outlier_table(found: &Identification, dataset: &Dataset) -> Table {
     let mut table = Table::new(
         "Rows set aside",
         vec![
             Column::count("row", "Row"),
             Column::text("session", "Session"),
+            Column::number("error_mm", "Error", "mm", 3),
             Column::number("robust_sigmas", "Size", "robust σ", 1),
         ],
     );
-    for (index, size) in &found.outliers.rows {
-        let row = dataset.rows.get(*index);
+    for Outlier { index, robust_sigmas, error_mm } in found.outliers.rows.iter().copied() {
+        let row = dataset.rows.get(index);
         table.push([
-            row_number(dataset, *index).into(),
+            row_number(dataset, index).into(),
             row.and_then(|row| row.session().map(str::to_owned)).into(),
-            (*size).into(),
+            error_mm.abs().into(),
+            robust_sigmas.into(),
         ]);
     }
     if table.rows.iter().all(|row| row[1] == Cell::Missing) {
@@ -234,11 +237,9 @@ pub fn outlier_table(found: &Identification, dataset: &Dataset) -> Table {
             row.remove(1);
         });
     }
-    table.notes.push(
-        "Beyond six robust standard deviations of a robust fit of geometry. Rows count as in the \
-         spreadsheet."
-            .to_owned(),
-    );
+    table.notes.push(format!(
+        "Beyond {OUTLIER_CUT} robust standard deviations of a robust fit of geometry. Rows count as in the spreadsheet."
+    ));
     table
 }
 

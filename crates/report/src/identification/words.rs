@@ -6,6 +6,7 @@ use crate::document::{Block, Verdict};
 use crate::number::Precision;
 use crate::status::Status;
 use truegrind_arm::parameter::Parameter;
+use truegrind_calibration::identification::fit::{OUTLIER_CUT, Outlier};
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
@@ -165,6 +166,22 @@ pub(super) fn readout_fusion_json(found: &Identification) -> Value {
     }
 }
 
+/// Most rows that a note lists.
+const LISTED: usize = 4;
+
+/// The rows that were set aside, the largest errors first.
+pub(super) fn set_aside(found: &Identification) -> String {
+    let numbers = &found.estimated.provenance.set_aside;
+    let error = |(number, row): (&usize, &Outlier)| format!("row {number} ({:.3} mm)", row.error_mm.abs());
+    let more = numbers.len().saturating_sub(LISTED);
+    let rows = numbers.iter().zip(&found.outliers.rows).take(LISTED).map(error);
+    let all: Vec<String> = rows.chain((more > 0).then(|| format!("{more} more"))).collect();
+    match all.as_slice() {
+        [] => "no gross outliers".to_owned(),
+        all => format!("gross outliers: {}", listed(all)),
+    }
+}
+
 /// Number of rows set aside as outliers.
 pub(super) fn outliers(found: &Identification) -> Block {
     let outliers = &found.outliers;
@@ -172,7 +189,7 @@ pub(super) fn outliers(found: &Identification) -> Block {
         (0, 0) => Block::Paragraph("No row was set aside as an outlier.".to_owned()),
         (0, many) => Verdict::new(
             Status::Warning,
-            format!("{many} rows lie beyond six robust standard deviations; these are too many for isolated outliers, so all rows are used"),
+            format!("{many} rows lie beyond {OUTLIER_CUT} robust standard deviations; these are too many for isolated outliers, so all rows are used"),
             ["look for what they have in common: a range of rows, a pose of the arm, a payload"],
         )
         .into(),

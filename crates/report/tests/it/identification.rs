@@ -6,6 +6,7 @@ use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_arm::sensor::Sensor;
 use truegrind_calibration::identification::benefit::Benefit;
 use truegrind_calibration::identification::beyond_noise::BeyondNoise;
+use truegrind_calibration::identification::fit::Outlier;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
@@ -208,8 +209,8 @@ fn a_verdict_is_one_sentence_with_its_reasons() {
         (Judgement::Fail, "[failed]", "The model must not be used"),
         (
             Judgement::NotEvaluated,
-            "[not evaluated]",
-            "No limits were stated (--limit-rmse, --limit-max); nothing else speaks against the model",
+            "[ok]",
+            "The model may be used; no limit of its error was stated (--limit-rmse, --limit-max)",
         ),
     ] {
         found.estimated.verdict.status = status;
@@ -235,13 +236,14 @@ fn outliers_are_listed_by_the_rows_of_the_spreadsheet() {
         row.line += 10;
         row.number = row.line as usize;
     }
-    found.outliers.rows = vec![(3, 41.26), (0, 7.5)];
+    let outlier = |index, robust_sigmas, error_mm| Outlier { index, robust_sigmas, error_mm };
+    found.outliers.rows = vec![outlier(3, 41.26, -2.4), outlier(0, 10.5, 0.6)];
     let table = view::outlier_table(&found, &dataset);
     let text = terminal::table(&table, 80);
     let lines: Vec<&str> = text.lines().collect();
-    assert_eq!(lines[1], "Row  Size [robust σ]");
-    assert_eq!(lines[3], " 15             41.3");
-    assert_eq!(lines[4], " 12              7.5");
+    assert_eq!(lines[1], "Row  Error [mm]  Size [robust σ]");
+    assert_eq!(lines[3], " 15       2.400             41.3");
+    assert_eq!(lines[4], " 12       0.600             10.5");
     dataset.rows[3].extra_mut().session = Some("monday".to_owned());
     let text = terminal::table(&view::outlier_table(&found, &dataset), 80);
     assert!(text.contains("monday") && text.contains('–'), "{text}");
@@ -250,7 +252,7 @@ fn outliers_are_listed_by_the_rows_of_the_spreadsheet() {
     found.outliers.rows.clear();
     found.outliers.too_many = 30;
     let text = markdown::document(&view::document(&found, &dataset));
-    assert!(text.contains("30 rows lie beyond six robust standard deviations"), "{text}");
+    assert!(text.contains("30 rows lie beyond 10 robust standard deviations"), "{text}");
 }
 
 #[test]

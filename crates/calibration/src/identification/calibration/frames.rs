@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::measurement::sensor::disturbance::Disturbance;
+use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 use truegrind_math::se3::Pose;
 
 /// Parameters of the measurement that a calibration estimates along with the arm.
@@ -21,6 +21,12 @@ pub struct Frames {
 }
 
 impl Frames {
+    /// How many stations but the first there are; their disturbances come before all others.
+    pub fn further_stations(&self) -> usize {
+        let of_station = |d: &&Disturbance| matches!(d.profile, Profile::Station { .. });
+        self.disturbances.iter().take_while(of_station).count()
+    }
+
     /// Everything at the origin, for `anchors` cables.
     pub fn at_origin(anchors: usize) -> Self {
         Self {

@@ -30,8 +30,10 @@ pub(super) struct Columns {
     pub(super) session: Option<usize>,
     /// approach1 to approach6, each where given.
     pub(super) approach: [Option<usize>; 6],
-    /// anchor.
+    /// anchor, of cables.
     pub(super) anchor: Option<usize>,
+    /// station, of trackers and cameras.
+    pub(super) station: Option<usize>,
     /// path, cycle, sample, where all three are there.
     pub(super) path: Option<[usize; 3]>,
     /// Columns that are kept but not used.
@@ -95,7 +97,10 @@ impl Columns {
                 notes.push(format!("column `{name}` is not used; did you mean {expected}?"));
             }
         }
-        let other: Vec<(String, usize)> = named.iter().filter(|(n, _)| !is_used(n)).cloned().collect();
+        let of_cable = sensor == Sensor::Cable;
+        let idle = if of_cable { "station" } else { "anchor" };
+        let other: Vec<(String, usize)> =
+            named.iter().filter(|(n, _)| !is_used(n) || n == idle).cloned().collect();
         if !other.is_empty() {
             let names: Vec<String> = other.iter().map(|(n, _)| format!("`{n}`")).collect();
             notes.push(format!("columns kept but not used: {}", names.join(", ")));
@@ -113,7 +118,8 @@ impl Columns {
             payload: get("payload"),
             session: get("session"),
             approach,
-            anchor: get("anchor"),
+            anchor: get("anchor").filter(|_| of_cable),
+            station: get("station").filter(|_| !of_cable),
             path,
             other,
             notes,
@@ -232,12 +238,13 @@ fn sensor_columns(
     }
 }
 
-const OPTIONAL: [&str; 12] = [
+const OPTIONAL: [&str; 13] = [
     "t",
     "session",
     "temperature",
     "payload",
     "anchor",
+    "station",
     "approach1",
     "approach2",
     "approach3",

@@ -32,7 +32,7 @@ pub(super) fn dataset(
     let reader = Reader { file, sheet: table.sheet.as_deref(), header: &table.rows[columns.header] };
     let (mut rows, mut blank, mut unnamed, mut as_text) = (Vec::new(), table.blank_lines, 0usize, 0usize);
     let mut conditions = Conditions::default();
-    let mut numbered = None;
+    let (mut numbered, mut stations) = (None, Stations::default());
     let lines = table.rows[columns.header + 1..].iter().map(|line| Ok(Cow::Borrowed(line)));
     for line in lines.chain(further.map(|line| line.map(Cow::Owned))) {
         checkpoint();
@@ -52,14 +52,26 @@ pub(super) fn dataset(
         let widest = line.cells.iter().rposition(|c| !c.is_empty()).map_or(0, |i| i + 1);
         unnamed = unnamed.max((0..widest).filter(|&i| !headed(i) && !line.cells[i].is_empty()).count());
         as_text += line.cells.iter().filter(|c| matches!(c, Cell::Number { as_text: true, .. })).count();
-        if let Some(column) = columns.anchor {
+        if let Some(column) = columns.anchor.or(columns.station) {
             let given = !line.cells.get(column).is_none_or(Cell::is_empty);
             if *numbered.get_or_insert(given) != given {
-                let expected = "the number of a cable outlet in every row, or in none";
-                return Err(reader.wrong(line, column, expected, "number the cable outlets 1, 2, 3, …"));
+                let [expected, remedy] = if columns.anchor.is_some() {
+                    [
+                        "the number of a cable outlet in every row, or in none",
+                        "number the cable outlets 1, 2, 3, …",
+                    ]
+                } else {
+                    [
+                        "the name of a station in every row, or in none",
+                        "name each place of the sensor, such as A and B",
+                    ]
+                };
+                return Err(reader.wrong(line, column, expected, remedy));
             }
         }
-        rows.push(reader.row(line, columns, &mut conditions)?);
+        let mut row = reader.row(line, columns, &mut conditions)?;
+        row.anchor += stations.index_of(columns.station.and_then(|column| line.cells.get(column)));
+        rows.push(row);
     }
     if rows.is_empty() {
         return Err(ImportError::Empty { location: reader.location() });
@@ -76,8 +88,10 @@ pub(super) fn dataset(
     notes.extend(
         counted.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")),
     );
-    notes.extend(number_anchors(&mut rows));
-    check_outlets(&reader, &rows)?;
+    if columns.anchor.is_some() {
+        notes.extend(number_anchors(&mut rows));
+    }
+    check_outlets(&reader, columns, &rows)?;
     if !options.allow_odd_units {
         check_units(&reader, &rows, columns.sensor)?;
     }
@@ -100,17 +114,35 @@ pub(super) fn dataset(
     })
 }
 
-/// Refuses more outlets than can be identified.
-fn check_outlets(reader: &Reader<'_>, rows: &[Row]) -> Result<(), ImportError> {
-    let outlets = rows.iter().map(|row| row.anchor + 1).max().unwrap_or(1);
-    if outlets <= MOST_OUTLETS {
+/// Names of stations in the order in which they are met.
+#[derive(Default)]
+struct Stations(HashMap<String, usize>);
+
+impl Stations {
+    fn index_of(&mut self, cell: Option<&Cell>) -> usize {
+        let Some(name) = cell.filter(|cell| !cell.is_empty()).map(Cell::to_string) else { return 0 };
+        let next = self.0.len();
+        *self.0.entry(name).or_insert(next)
+    }
+}
+
+/// Refuses more outlets or stations than can be identified.
+fn check_outlets(reader: &Reader<'_>, columns: &Columns, rows: &[Row]) -> Result<(), ImportError> {
+    let places = rows.iter().map(|row| row.anchor + 1).max().unwrap_or(1);
+    if places <= MOST_OUTLETS {
         return Ok(());
     }
+    let (column, what, remedy) = if columns.station.is_some() {
+        ("station", "stations", "each station adds six unknowns: `session` names rows of one station")
+    } else {
+        let remedy = "each outlet adds four unknowns: put the rows of further outlets into other files";
+        ("anchor", "cable outlets", remedy)
+    };
     Err(ImportError::Cell {
-        location: Location { column: Some("anchor".into()), ..reader.location() },
-        found: format!("{outlets} different cable outlets").into(),
+        location: Location { column: Some(column.into()), ..reader.location() },
+        found: format!("{places} different {what}").into(),
         expected: "at most 64 in one file",
-        remedy: "each outlet adds four unknowns: put the rows of further outlets into other files",
+        remedy,
     })
 }
 

@@ -19,8 +19,10 @@ const QUATERNION: &str = "orientation of the target in the sensor's frame, a uni
 const TIME: &str = "hours since the start (may be empty)";
 const TEMPERATURE: &str = "temperature of the arm (°C, may be empty)";
 const PAYLOAD: &str = "load on the flange (kg, may be empty)";
-const SESSION: &str = "any name; a new one where sensor or target may have shifted, which is then checked; rows that were measured \
-                       from another place belong in another file (may be empty)";
+const SESSION: &str =
+    "any name; a new one where sensor or target may have shifted, which is then checked (may be empty)";
+const STATION: &str = "any name of the place where the sensor stood, the same where it was not moved on purpose; at least four poses from each \
+                       (may be empty in all rows where there is only one)";
 const OUTLET: &str =
     "number of the cable's outlet, from 1 (may be empty in all rows where there is only one)";
 const READOUT: &str =
@@ -46,10 +48,10 @@ pub fn columns(sensor: Sensor) -> Vec<Column> {
     let position = of(&column_names::POSITION, POSITION);
     let reading = match sensor {
         Sensor::Cable => [of(&["L"], CABLE), of(&["anchor"], OUTLET)].concat(),
-        Sensor::Position => position,
+        Sensor::Position => [position, of(&["station"], STATION)].concat(),
         Sensor::Pose => {
             let turn = of(&column_names::QUATERNION, QUATERNION);
-            [position, turn].concat()
+            [position, turn, of(&["station"], STATION)].concat()
         }
     };
     // A cable measures no position on a path.

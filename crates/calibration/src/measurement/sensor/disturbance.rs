@@ -80,6 +80,11 @@ pub enum Profile {
         /// T (h).
         time_constant_h: f64,
     },
+    /// 1 in the rows of one station, else 0.
+    Station {
+        /// The station, from 0.
+        station: usize,
+    },
     /// Per kelvin above a reference, with the row's temperature.
     Temperature {
         /// Reference [°C].
@@ -93,6 +98,7 @@ impl Profile {
         match *self {
             Profile::Constant => 1.0,
             Profile::Rows { from, to } => f64::from(u8::from((from..=to).contains(&row.number))),
+            Profile::Station { station } => f64::from(u8::from(row.anchor == station)),
             Profile::Exponential { start_h, time_constant_h } => {
                 row.condition.time_h.map_or(0.0, |t| 1.0 - (-(t - start_h).max(0.0) / time_constant_h).exp())
             }

@@ -1,0 +1,118 @@
+//! Readings of a tracker or camera that was set up in several places (column `station`), brought into the frame of the first.
+//!
+//! The data sheet's arm places each station; that is as exact as the arm. How each stands to the first is therefore one of the
+//! [`disturbances`] of the measurement, a shift and a turn that every fit estimates along with the arm. Range and bearing of a station beyond
+//! the first are no longer told apart, so that errors that depend on the distance are the first one's.
+
+use nalgebra::{Point3, Vector3};
+use thiserror::Error;
+
+use super::dataset::{Dataset, Reading, Row, Sensor};
+use super::registration::{self, known_target};
+use super::sensor::disturbance::{Disturbance, Kind, Profile};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Model;
+use truegrind_math::se3::Pose;
+
+/// Fewest rows that place a station well: twice as many readings as unknowns.
+const FEWEST: usize = 4;
+
+/// The rows of a station do not say where it stood.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error(
+    "{file}: the {rows} rows of station {station} (column station) do not show where it stood: measure at least {FEWEST} poses from each station, \
+     not on a line"
+)]
+pub struct StationError {
+    /// File.
+    pub file: String,
+    /// Station, from 1.
+    pub station: usize,
+    /// Its rows.
+    pub rows: usize,
+}
+
+/// How each station but the first stands to where the data sheet's arm puts it: nothing yet, to be fitted.
+pub fn disturbances(stations: usize) -> Vec<Disturbance> {
+    (1..stations)
+        .map(|station| Disturbance::new(Kind::Frame { turning: true }, Profile::Station { station }))
+        .collect()
+}
+
+/// The rows of each station, by index.
+pub(super) fn rows_of_stations(dataset: &Dataset) -> Vec<Vec<usize>> {
+    let mut out = vec![Vec::new(); dataset.stations()];
+    for (index, row) in dataset.rows.iter().enumerate() {
+        out[if dataset.sensor == Sensor::Cable { 0 } else { row.anchor }].push(index);
+    }
+    out
+}
+
+/// Brings the readings of all stations into the frame of the first, as the data sheet's arm tells, with a note.
+///
+/// # Errors
+/// [`StationError`] where a station has too few rows.
+pub(super) fn in_frame_of_first(dataset: &mut Dataset, nominal: &Model) -> Result<(), StationError> {
+    if dataset.stations() < 2 {
+        return Ok(());
+    }
+    let stations = rows_of_stations(dataset);
+    let placed = placed_by_arm(dataset, nominal, &stations)?;
+    let first_from_base = placed[0].inverse();
+    for row in dataset.rows.iter_mut().filter(|row| row.anchor > 0) {
+        let first_from_station = first_from_base * placed[row.anchor];
+        match &mut row.reading {
+            Reading::Position(place) => *place = (first_from_station * Point3::from(*place)).coords,
+            Reading::Pose(pose) => **pose = first_from_station * **pose,
+            Reading::Cable(_) => {}
+        }
+    }
+    let counts: Vec<String> = stations.iter().map(|rows| rows.len().to_string()).collect();
+    dataset.notes.push(format!(
+        "{} stations with {} rows: readings are in the frame of the first, and how the others stand to it is fitted with the arm",
+        stations.len(),
+        truegrind_math::sentence::listed(&counts)
+    ));
+    Ok(())
+}
+
+/// Where the stations stand in the base, with the target where the station with the most rows sees it.
+fn placed_by_arm(
+    dataset: &Dataset,
+    nominal: &Model,
+    stations: &[Vec<usize>],
+) -> Result<Vec<Pose>, StationError> {
+    let posed = nominal.at_condition(&Condition::default());
+    let flanges = |rows: &[usize]| -> Vec<Pose> {
+        rows.iter().map(|&row| posed.forward(&dataset.rows[row].joints)).collect()
+    };
+    let places = |rows: &[usize]| -> Vec<Vector3<f64>> {
+        rows.iter().map(|&row| dataset.rows[row].reading.place_mm()).collect()
+    };
+    let unplaced = |station: usize| StationError {
+        file: dataset.file.clone(),
+        station: station + 1,
+        rows: stations[station].len(),
+    };
+    let largest = (0..stations.len()).max_by_key(|&station| stations[station].len()).unwrap_or_default();
+    let target_mm = target_mm(&flanges(&stations[largest]), &stations[largest], dataset)
+        .ok_or_else(|| unplaced(largest))?;
+    let place = |(station, rows): (usize, &Vec<usize>)| {
+        let fit = known_target(&flanges(rows), &places(rows), &target_mm);
+        fit.filter(|_| rows.len() >= FEWEST).map(|fit| fit.base_from_sensor).ok_or_else(|| unplaced(station))
+    };
+    stations.iter().enumerate().map(place).collect()
+}
+
+/// The target on the flange as rows of one station show it.
+fn target_mm(flanges: &[Pose], rows: &[usize], dataset: &Dataset) -> Option<Vector3<f64>> {
+    let readings = || rows.iter().map(|&row| &dataset.rows[row]).map(|row: &Row| &row.reading);
+    if dataset.sensor == Sensor::Pose {
+        let poses: Vec<Pose> = readings()
+            .filter_map(|reading| if let Reading::Pose(p) = reading { Some(**p) } else { None })
+            .collect();
+        return Some(registration::poses(flanges, &poses)?.flange_from_target.translation.vector);
+    }
+    let places: Vec<Vector3<f64>> = readings().map(Reading::place_mm).collect();
+    Some(registration::target_point(flanges, &places)?.target_mm)
+}

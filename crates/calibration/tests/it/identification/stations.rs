@@ -1,0 +1,156 @@
+//! A tracker that was set up in three places: one arm is fitted to all rows, and the places are nobody's fault.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use truegrind_arm::model::Model;
+use truegrind_arm::robots;
+use truegrind_calibration::diagnosis::diagnose::{Options as DiagnoseOptions, diagnose};
+use truegrind_calibration::diagnosis::finding::Confidence;
+use truegrind_calibration::identification::identify::{Identification, Options, identify};
+use truegrind_calibration::identification::register::starting_frames;
+use truegrind_calibration::identification::tolerance::Tolerance;
+use truegrind_calibration::measurement::convention::AngleConvention;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading};
+use truegrind_calibration::measurement::matching::{Mismatch, match_to_arm};
+use truegrind_calibration::measurement::simulation::recipe::Recipe;
+use truegrind_calibration::measurement::{import, split};
+use truegrind_calibration::tracking::{Options as TrackOptions, Tracker};
+use truegrind_math::se3::Pose;
+
+fn arm() -> Model {
+    robots::load("abb-irb-120").unwrap().model
+}
+
+/// An IRB 120 whose links are off and whose joints 2 and 3 yield, measured from one place, and its true arm.
+fn measured(sensor: &str, count: usize) -> (Dataset, Model) {
+    let (target, noise) = if sensor == "pose" {
+        ("target = { position_mm = [38.2, 12.6, 61.3], wxyz = [0.9, 0.3, 0.1, 0.2] }", "sigma_deg = 0.002\n")
+    } else {
+        ("reflector_mm = [38.2, 12.6, 61.3]", "")
+    };
+    let recipe = format!(
+        "robot = \"abb-irb-120\"\nseed = 5\n[arm.random]\nseed = 8\na_mm = 0.5\nd_mm = 0.5\nalpha_deg = 0.05\nbeta_deg = 0.05\n\
+         theta_deg = 0.1\n[[arm.effect]]\neffect = \"joint-compliance\"\njoint = 1\ncompliance_rad_per_nm = 8e-6\n\
+         [poses]\nkind = \"random\"\ncount = {count}\nmin_deg = [-90.0, -50.0, -60.0, -120.0, -100.0, -150.0]\n\
+         max_deg = [90.0, 60.0, 50.0, 120.0, 100.0, 150.0]\n[sensor]\nkind = \"{sensor}\"\n\
+         frame = {{ position_mm = [2310.5, -640.2, 512.7], wxyz = [0.12, 0.02, -0.03, 0.99] }}\n{target}\n\
+         [noise]\nsigma_mm = 0.01\n{noise}"
+    );
+    let load = |name: &str| robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
+    let simulation = Recipe::parse(&recipe, "case").unwrap().simulate(load).unwrap();
+    let rows = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
+    (rows, simulation.actual)
+}
+
+/// Where each station stands in the frame of the first.
+fn places() -> [Pose; 3] {
+    let turned = |x, y, z, angle: f64| {
+        let turn = UnitQuaternion::from_euler_angles(0.03, -0.05, angle);
+        Pose::from_parts(Vector3::new(x, y, z).into(), turn)
+    };
+    [Pose::identity(), turned(-4100.0, 2600.0, 310.0, 2.2), turned(900.0, -3800.0, -220.0, -1.3)]
+}
+
+/// The same measurement, its rows read from the three places in turn: a third each.
+fn moved(mut rows: Dataset) -> Dataset {
+    let each = rows.rows.len().div_ceil(3);
+    for (index, row) in rows.rows.iter_mut().enumerate() {
+        row.anchor = index / each;
+        let from_place = places()[row.anchor].inverse();
+        match &mut row.reading {
+            Reading::Position(place) => *place = (from_place * Point3::from(*place)).coords,
+            Reading::Pose(pose) => **pose = from_place * **pose,
+            Reading::Cable(_) => unreachable!(),
+        }
+    }
+    rows
+}
+
+fn matched(rows: Dataset) -> Dataset {
+    match_to_arm(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap()
+}
+
+fn identified(rows: &Dataset) -> Identification {
+    let options = Options::default();
+    let frames = starting_frames(rows, &arm(), &options.tolerance, true).unwrap();
+    identify(rows, "abb-irb-120", &arm(), &frames, &|rows| split::random(rows, 0.2, 0), &options).unwrap()
+}
+
+#[test]
+fn three_stations_give_the_arm_that_one_gives() {
+    for sensor in ["position", "pose"] {
+        let (rows, _) = measured(sensor, 180);
+        let one = identified(&matched(rows.clone()));
+        let several = matched(moved(rows));
+        assert_eq!(several.stations(), 3);
+        assert!(several.notes.iter().any(|note| note.starts_with("3 stations with 60, 60 and 60 rows")));
+        let found = identified(&several);
+        let held_out = |of: &Identification| of.estimated.geometry.held_out.rmse;
+        assert!(held_out(&found) < 1.2 * held_out(&one), "{sensor}: {} {}", held_out(&found), held_out(&one));
+        for (a, b) in found.estimated.parameters.iter().zip(&one.estimated.parameters) {
+            // Twelve more unknowns: wider, but never another arm.
+            assert_eq!(a.name, b.name);
+            assert!(a.sigma >= 0.8 * b.sigma, "{sensor} {}: {} {}", a.name, a.sigma, b.sigma);
+            let off = (a.value - b.value).abs() / a.sigma;
+            assert!(off < 3.0, "{sensor} {}: {off:.1} standard deviations", a.name);
+        }
+        let names: Vec<&str> = found.parameters.iter().map(|p| p.name.as_str()).collect();
+        assert!(names.contains(&"station2.x") && names.contains(&"station3.rz"), "{names:?}");
+    }
+}
+
+#[test]
+fn a_diagnosis_names_the_cause_and_no_shift_of_the_sensor() {
+    let (rows, actual) = measured("position", 180);
+    let rows = matched(moved(rows));
+    let frames = starting_frames(&rows, &arm(), &Tolerance::default(), true).unwrap();
+    let found =
+        diagnose(&rows, "abb-irb-120", &arm(), &frames, &DiagnoseOptions::default(), &|_| {}).unwrap();
+    let told: Vec<String> = found.diagnosis.findings.iter().map(|f| f.effect.to_string()).collect();
+    assert_eq!(told, ["joint-compliance"]);
+    assert_eq!(found.diagnosis.findings[0].confidence, Confidence::Identified);
+    // The parameters of the cause are its own, beside those of the stations.
+    let [truth, cause] = [&actual, &found.extended.model].map(|arm| arm.effects[0].parameters()[0].value);
+    assert!((cause / truth - 1.0).abs() < 0.1, "{cause} {truth}");
+    assert_eq!(found.extended.parameter_indices(0).len(), 1);
+    assert!(found.diagnosis.fits.extended.cv_rmse_mm < 0.03);
+}
+
+#[test]
+fn a_station_with_too_few_rows_is_refused_by_number() {
+    let (rows, _) = measured("position", 90);
+    let mut rows = moved(rows);
+    let kept: Vec<usize> = (0..rows.rows.len()).filter(|&i| rows.rows[i].anchor != 1 || i < 32).collect();
+    rows = rows.subset(&kept);
+    let refused = match_to_arm(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap_err();
+    assert!(matches!(&refused, Mismatch::Station(why) if (why.station, why.rows) == (2, 2)), "{refused}");
+}
+
+#[test]
+fn a_track_follows_one_station() {
+    let (rows, _) = measured("position", 90);
+    let model = identified(&matched(rows.clone())).estimated;
+    let refused = Tracker::begin(&model, "hash", &moved(rows), &TrackOptions::default()).unwrap_err();
+    assert!(refused.to_string().contains("3 stations"), "{refused}");
+}
+
+#[test]
+fn the_column_station_holds_names() {
+    let head = "q1,q2,q3,q4,q5,q6,measured_x,measured_y,measured_z,station\n";
+    let read = |rows: &str| {
+        import::read("case.csv", format!("{head}{rows}").as_bytes(), &import::Options::default())
+    };
+    let rows =
+        read("1,2,3,4,5,6,700,800,900,door\n2,3,4,5,6,7,701,801,901,window\n3,4,5,6,7,8,702,802,902,door\n");
+    let rows = rows.unwrap();
+    assert_eq!(rows.rows.iter().map(|row| row.anchor).collect::<Vec<_>>(), [0, 1, 0]);
+    assert_eq!((rows.stations(), rows.anchors()), (2, 1));
+    let refused = read("1,2,3,4,5,6,700,800,900,door\n2,3,4,5,6,7,701,801,901,\n").unwrap_err();
+    assert!(refused.to_string().contains("the name of a station in every row, or in none"), "{refused}");
+    // Of a cable it is a column like any other.
+    let cable = "q1,q2,q3,q4,q5,q6,L,station\n1,2,3,4,5,6,700,door\n2,3,4,5,6,7,701,\n";
+    let cable = import::read("case.csv", cable.as_bytes(), &import::Options::default()).unwrap();
+    assert_eq!(
+        (cable.stations(), cable.anchors(), cable.other_columns.as_slice()),
+        (1, 1, &["station".to_owned()][..])
+    );
+}
