@@ -75,6 +75,10 @@ struct Labels {
 /// characters.
 const BESIDE: f64 = 0.55;
 const CHARACTER: f64 = 0.0095;
+/// Farther from the middle a label leaves the view.
+const FARTHEST: f64 = 0.7;
+/// How much a label is lifted, over how far it goes sideways.
+const LIFTED: f64 = 0.8;
 /// Labels are about so long, over the size of the cut.
 const LABEL_LENGTH: f64 = 0.4;
 
@@ -85,16 +89,18 @@ impl Labels {
         Self { middle: nalgebra::center(&low, &high), size_mm: plan.extent_mm, taken: Vec::new() }
     }
 
-    /// Position of the label of `point`; `None` where it would overlap another.
+    /// Position of the label of `point`: on its side of the cut, on the other, or above; `None` where each would overlap another.
     fn take(&mut self, point: &PathPoint, label: &str) -> Option<Point3<f64>> {
-        let away = (intended(point) - self.middle).try_normalize(1e-9).unwrap_or_else(Vector3::z);
-        let distance = BESIDE + CHARACTER * label.chars().count() as f64;
-        let position = self.middle + away * (distance * self.size_mm);
-        let free = self.taken.iter().all(|other| (other - position).norm() >= LABEL_LENGTH * self.size_mm);
-        free.then(|| {
-            self.taken.push(position);
-            position
-        })
+        let beside = (intended(point) - self.middle).try_normalize(1e-9).unwrap_or_else(Vector3::z);
+        // Lifted, since a view is wider than high and a label beside the path would end beyond its edge.
+        let lifted = |side: Vector3<f64>| (side + LIFTED * Vector3::z()).try_normalize(1e-9).unwrap_or(side);
+        let distance = (BESIDE + CHARACTER * label.chars().count() as f64).min(FARTHEST) * self.size_mm;
+        let positions =
+            [lifted(beside), lifted(-beside), Vector3::z()].map(|away| self.middle + away * distance);
+        let far = |a: &Point3<f64>, b: &Point3<f64>| (a - b).norm() >= LABEL_LENGTH * self.size_mm;
+        let free = positions.into_iter().find(|position| self.taken.iter().all(|other| far(other, position)));
+        self.taken.extend(free);
+        free
     }
 }
 
