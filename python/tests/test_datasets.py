@@ -35,6 +35,22 @@ def test_arrays():
     assert np.array_equal(given.q_deg, file.q_deg) and np.array_equal(given.position_mm, file.position_mm)
 
 
+def test_stations_of_a_tracker_are_fitted_together():
+    table = columns()
+    q = np.stack([table[name] for name in NAMES], axis=1)
+    place = np.stack([table[f"measured_{axis}"] for axis in "xyz"], axis=1)
+    half = len(q) // 2
+    moved = place.copy()
+    moved[half:] = np.stack([500.0 - place[half:, 1], place[half:, 0] + 200.0, place[half:, 2]], axis=1)
+    station = ["door"] * half + ["window"] * (len(q) - half)
+    one = tg.identify(tg.Dataset.from_numpy(q, position_mm=place), "abb-irb-120")
+    two = tg.identify(tg.Dataset.from_numpy(q, position_mm=moved, station=station), "abb-irb-120")
+    assert two.held_out_rmse_mm < 1.1 * one.held_out_rmse_mm
+    with pytest.raises(tg.DatasetError, match="station 2"):
+        lonely = ["door"] * (len(q) - 1) + ["window"]
+        tg.identify(tg.Dataset.from_numpy(q, position_mm=place, station=lonely), "abb-irb-120")
+
+
 @pytest.mark.parametrize("library", ["pandas", "polars", "pyarrow", "dict"])
 def test_data_frames(library):
     table = columns()
