@@ -492,6 +492,9 @@ impl Lattice for ModalState {
         if self.feed.per_minute != other.feed.per_minute {
             self.feed.rate = Err(Reason::UnknownFlow);
         }
+        // A stop that not every path has is none: motions that may blend belong to one cut.
+        self.feed.exact_stop &= other.feed.exact_stop;
+        self.feed.exact_stop_modal &= other.feed.exact_stop_modal;
         if self.saved != other.saved {
             self.saved = None;
         }

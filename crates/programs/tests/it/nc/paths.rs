@@ -169,6 +169,19 @@ fn programs_of_other_files_may_call_the_programs_of_a_file_in_any_state() {
 }
 
 #[test]
+fn an_exact_stop_that_may_be_skipped_is_none() {
+    let stops = |block: &str| {
+        let source = format!("{HEAD}{}{block}\n{G}\n", begin(LinuxCnc));
+        let setup = Setup { dialect: Some(LinuxCnc), ..Setup::default() };
+        Task::read(&[("x", source.as_bytes())], &setup).listing.motions[1].zone.is_some()
+    };
+    assert!(stops("G61"));
+    assert!(!stops("/G61"));
+    assert!(!stops("o1 if [#1 gt 1]\nG61\no1 endif"));
+    assert!(!stops("G61\n/G64"));
+}
+
+#[test]
 fn variables_hold_where_all_paths_agree_on_them() {
     let go = "G1 X#1 Y5. Z5. A180. B0. C0. F500. (?)";
     check(Fanuc, &format!("#1=5.\nWHILE [#2 LT 5] DO1\n#2=#2+1\n{go}\nEND1\n{go}"), &[None, None]);
