@@ -2,7 +2,8 @@
 //! their calls. The states of all paths that lead to such a place are joined there.
 //!
 //! Method: a pass over the text adds to each place what leads there; passes repeat until none adds anything. What they find then holds on
-//! every path, whether or not the transfer function is monotone. Code that no path reaches contributes nothing at first; once nothing
+//! every path, whatever they began with and whether or not the transfer function is monotone. They begin with the guess that calls change
+//! nothing, since otherwise each of many calls in a row would take a pass; what followed from wrong guesses is then dropped. Code that no path reaches contributes nothing at first; once nothing
 //! changes, it is taken to run in the state of [`Interpreter::join_unseen_predecessors`], in case it is reached after all. A file with a jump
 //! or call that may lead anywhere is read by that rule alone.
 
@@ -19,7 +20,9 @@ use crate::dataflow::Lattice;
 use crate::motion::Reason;
 
 /// How many passes a file gets: each level of calls and loops takes one.
-const PASSES: usize = 8;
+const PASSES: usize = 9;
+/// How many of them, behind the first, start anew from what the one before has found, if that rested on a guess.
+const FRESH: usize = 2;
 
 /// A place to which control comes from elsewhere.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -42,6 +45,11 @@ pub(super) enum Site {
 #[derive(Debug, Default)]
 pub(super) struct Paths {
     arrived: HashMap<Site, ModalState>,
+    /// Those of the pass before, where this one starts anew.
+    before: HashMap<Site, ModalState>,
+    /// Whether calls are guessed to change nothing where their end has not been reached, and whether one has been.
+    guesses: bool,
+    has_guessed: bool,
     /// Where something leads, and which places there are.
     targets: HashSet<Site>,
     places: HashSet<Site>,
@@ -111,7 +119,9 @@ impl Interpreter<'_, '_> {
             return false;
         }
         self.paths = Some(Box::default());
-        for _ in 0..PASSES {
+        let mut fresh = 0..FRESH;
+        for pass in 0..PASSES {
+            let is_fresh = self.prepare_pass(pass, &mut fresh);
             self.truncate_to(lengths);
             self.state = start.clone();
             self.pass = Pass::default();
@@ -120,6 +130,12 @@ impl Interpreter<'_, '_> {
             let Some(paths) = self.paths.as_mut() else { break };
             if is_open || paths.leads_elsewhere() {
                 break;
+            }
+            if is_fresh {
+                if paths.arrived == paths.before {
+                    fresh = 0..0;
+                }
+                continue;
             }
             let has_unreached = std::mem::take(&mut paths.has_unreached);
             if std::mem::take(&mut paths.has_grown) {
@@ -132,6 +148,16 @@ impl Interpreter<'_, '_> {
         }
         self.paths = None;
         false
+    }
+
+    /// Whether a pass starts anew from what the one before has found.
+    fn prepare_pass(&mut self, pass: usize, fresh: &mut std::ops::Range<usize>) -> bool {
+        let Some(paths) = &mut self.paths else { return false };
+        paths.guesses = pass == 0;
+        let is_fresh = pass > 0 && paths.has_guessed && fresh.next().is_some();
+        paths.before = if is_fresh { std::mem::take(&mut paths.arrived) } else { HashMap::new() };
+        (paths.has_grown, paths.has_unreached) = (false, false);
+        is_fresh
     }
 
     /// Control may lead from here to a place that the text does not show.
@@ -175,7 +201,7 @@ impl Interpreter<'_, '_> {
     /// Takes the state that arrives at a place, joined with that of another path.
     fn settle(&mut self, site: &Site, other: Option<ModalState>) {
         let Some(paths) = &mut self.paths else { return self.join_unseen_predecessors() };
-        let mut arriving = paths.arrived.get(site).cloned();
+        let mut arriving = paths.arrived.get(site).or_else(|| paths.before.get(site)).cloned();
         arriving.join(&other);
         paths.places.insert(site.clone());
         let Some(state) = arriving else {
@@ -375,10 +401,21 @@ impl Interpreter<'_, '_> {
         self.state.variables.invalidate(Reason::UnknownFlow);
         self.depart(entry.clone());
         let site = self.return_of(name);
-        self.settle(&site, passed);
+        let guess = self.guess(&site);
+        self.settle(&site, passed.or(guess));
         if self.may_call_again(block) {
             self.depart(entry);
         }
+    }
+
+    /// The state behind a call whose end no pass has reached yet.
+    fn guess(&mut self, site: &Site) -> Option<ModalState> {
+        let paths = self.paths.as_mut()?;
+        if !paths.guesses || self.pass.unreached || paths.arrived.contains_key(site) {
+            return None;
+        }
+        paths.has_guessed = true;
+        Some(at_join(&self.state))
     }
 
     /// Whether a call may run its program several times in a row (M98 P1 L3, P30001).

@@ -189,6 +189,20 @@ fn variables_hold_where_all_paths_agree_on_them() {
     check(Fanuc, &format!("#1=5.\nM98 P2\n{go}\nM30\nO2\n{go}\nM99"), &[FLOW, FLOW]);
 }
 
+/// The end of each is the start of the next.
+#[test]
+fn many_calls_in_a_row_are_no_levels() {
+    let calls: String = (0..50).map(|k| format!("M98 P{}\n", 100 + k)).collect();
+    let subs =
+        |last: &str| -> String { (0..50).map(|k| format!("O{}\n{G}\n{last}M99\n", 100 + k)).collect() };
+    let source = |last: &str| format!("{HEAD}O1\n{}{calls}{G}\nG55\nM30\n{}", begin(Fanuc), subs(last));
+    assert_eq!(marked(Fanuc, &source("")), [None; 51]);
+    // The first one runs before any has selected G55.
+    let found = marked(Fanuc, &source("G55\n"));
+    assert_eq!(found[1], None);
+    assert!(found.iter().all(|reason| matches!(*reason, None | FLOW)));
+}
+
 /// Each call is followed by another: more levels than passes. The rule for the whole file holds then.
 #[test]
 fn many_levels_of_calls_end() {
