@@ -25,6 +25,7 @@ mod paths;
 mod position_dependencies;
 mod m_words;
 mod unmodified;
+mod remainder;
 mod subprograms;
 
 const DIALECTS: [Dialect; 5] =
