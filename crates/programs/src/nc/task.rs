@@ -1,8 +1,9 @@
 //! Abstract interpretation of NC files: every motion block, with the modal state in which it runs.
 //!
 //! Blocks are interpreted in the order of the text ([`crate::dataflow`]); one that may be skipped is joined with the state
-//! before it. At a label, a loop or the start of a subprogram the state is joined with states of unseen predecessors, so that
-//! only modal groups which the whole file sets to one value stay known.
+//! before it. At a label, a loop or the start of a subprogram the states of all paths that lead there are joined ([`paths`]). Where
+//! they do not follow from the text, the state is joined with states of unseen predecessors, so that only modal groups which the
+//! whole file sets to one value stay known.
 
 mod modal_codes;
 mod siemens_commands;
