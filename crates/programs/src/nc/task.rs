@@ -584,7 +584,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             let returns = block.m.contains(&99) && block.p.is_none();
             self.branch_by(if returns { FlowPoint::Return } else { FlowPoint::Leaves });
             if returns && !block.m.iter().any(|m| matches!(m, 46 | 96)) {
-                self.returns_from(&[self.pass.program.clone()]);
+                self.returns_from(vec![self.pass.program.clone()]);
             } else if dialect != Dialect::Heidenhain {
                 self.leads_anywhere();
             }

@@ -327,7 +327,7 @@ impl Interpreter<'_, '_> {
             // The main path bypasses a subprogram, whose state holds only where it is called.
             b"ENDSUB" if self.pass.before_subprogram.is_some() => {
                 let program = std::mem::take(&mut self.pass.program);
-                self.returns_from(&[program]);
+                self.returns_from(vec![program]);
                 if let Some((state, unreached)) = self.pass.before_subprogram.take() {
                     (self.state, self.pass.unreached) = (state, unreached);
                 }
@@ -339,7 +339,7 @@ impl Interpreter<'_, '_> {
             }
             b"RETURN" => {
                 if self.paths.is_some() {
-                    self.returns_from(&[self.pass.program.clone()]);
+                    self.returns_from(vec![self.pass.program.clone()]);
                     self.stop();
                     self.events.push(StateEvent::Branch);
                 } else {

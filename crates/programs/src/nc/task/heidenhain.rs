@@ -134,7 +134,7 @@ impl<'s> Interpreter<'_, 's> {
             }
             b"LBL" => {
                 let labels = std::mem::take(&mut self.pass.labels);
-                self.returns_from(&labels);
+                self.returns_from(labels);
                 self.branch_by(FlowPoint::Return);
             }
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {

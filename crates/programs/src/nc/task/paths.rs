@@ -329,14 +329,14 @@ impl Interpreter<'_, '_> {
     }
 
     /// Control may return to the callers of these programs or labels. Their variables may be local.
-    pub(super) fn returns_from(&mut self, names: &[Variable]) {
+    pub(super) fn returns_from(&mut self, names: Vec<Variable>) {
         if self.paths.is_none() {
             return;
         }
         let kept = self.state.variables.clone();
         self.state.variables.invalidate(Reason::UnknownFlow);
         for name in names {
-            self.depart(self.return_of(name));
+            self.depart(self.return_of(&name));
         }
         self.state.variables = kept;
     }
