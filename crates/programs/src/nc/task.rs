@@ -5,6 +5,7 @@
 //! they do not follow from the text, the state is joined with states of unseen predecessors, so that only modal groups which the
 //! whole file sets to one value stay known.
 
+mod arrivals;
 mod modal_codes;
 mod siemens_commands;
 mod invalidation;
@@ -44,12 +45,12 @@ use crate::dataflow::{Control, Nesting, Transfer};
 use crate::motion::{
     Frame, InvalidStatement, Listing, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
 };
+use arrivals::{Paths, Structure};
 use block::Block;
 pub(super) use block_context::{BlockArc, BlockContext, StartDependency, StateEvent};
 use call_edges::{CallEdges, FlowPoint};
 use file_effects::FileEffects;
 use file_scan::FileScan;
-use paths::{Paths, Structure};
 
 /// NC files that are read together: each runs on its own, the setup is common to all.
 #[derive(Debug)]

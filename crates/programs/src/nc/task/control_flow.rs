@@ -5,8 +5,9 @@ use super::super::expression::{Evaluated, Variable, numbered};
 use super::super::modal_group::ModalGroup;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
+use super::arrivals::{Site, is_label, label};
 use super::call_edges::program_of;
-use super::paths::{Site, is_jump};
+use super::paths::is_jump;
 use super::siemens_names::{AddressEffect, address_effect};
 use super::{Block, FlowPoint, Interpreter, StateEvent};
 use crate::motion::Reason;
@@ -464,17 +465,4 @@ impl Interpreter<'_, '_> {
     pub(super) fn word_text(&self, word: &Word<'_>) -> Variable {
         self.tree.source()[self.tree.range(word.first, word.end)].to_ascii_uppercase()
     }
-}
-
-/// What the names of labels begin with.
-const LABEL: &[u8] = b"LBL ";
-
-/// Whether a name is that of a label of Heidenhain.
-pub(super) fn is_label(name: &[u8]) -> bool {
-    name.starts_with(LABEL)
-}
-
-/// The name of a label of Heidenhain.
-pub(super) fn label(name: &[u8]) -> Variable {
-    [LABEL, name].concat()
 }

@@ -7,14 +7,14 @@
 //! changes, it is taken to run in the state of [`Interpreter::join_unseen_predecessors`], in case it is reached after all. A file with a jump
 //! or call that may lead anywhere is read by that rule alone.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Variable, numbered};
 use super::super::modal_state::ModalState;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
-use super::control_flow::is_label;
+use super::arrivals::{Site, Structure, StructureKind, is_label, label};
 use super::{Block, Interpreter, Lengths, Pass, StateEvent};
 use crate::dataflow::Lattice;
 use crate::motion::Reason;
@@ -23,94 +23,6 @@ use crate::motion::Reason;
 const PASSES: usize = 9;
 /// How many of them, behind the first, start anew from what the one before has found, if that rested on a guess.
 const FRESH: usize = 2;
-
-/// A place to which control comes from elsewhere.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) enum Site {
-    /// A label or block number.
-    Label(Variable),
-    /// A program or subprogram.
-    Program(Variable),
-    /// Behind the calls of a program or label.
-    Return(Variable),
-    /// The head of a loop, by the block that opens it.
-    Head(u32),
-    /// The branch of this number, if the conditions before it are false.
-    Branch(u32, u32),
-    /// Behind a loop or branches.
-    Behind(u32),
-}
-
-/// The states that arrive at each place of a file, from all passes so far.
-#[derive(Debug, Default)]
-pub(super) struct Paths {
-    arrived: HashMap<Site, ModalState>,
-    /// Those of the pass before, where this one starts anew.
-    before: HashMap<Site, ModalState>,
-    /// Whether calls are guessed to change nothing where their end has not been reached, and whether one has been.
-    guesses: bool,
-    has_guessed: bool,
-    /// Where something leads, and which places there are.
-    targets: HashSet<Site>,
-    places: HashSet<Site>,
-    /// Whether this pass has added anything.
-    has_grown: bool,
-    /// Whether something may lead anywhere.
-    is_open: bool,
-    /// Whether labels are also reached by jumps: the return of any may then end any other (Heidenhain).
-    returns_are_common: bool,
-    /// Whether code that no path reaches is taken to run.
-    is_all_reached: bool,
-    /// Whether this pass has found code that no path reaches.
-    has_unreached: bool,
-}
-
-impl Paths {
-    fn add(&mut self, site: &Site, state: &ModalState) {
-        match self.arrived.get_mut(site) {
-            Some(all) => {
-                let before = all.clone();
-                all.join(state);
-                self.has_grown |= *all != before;
-            }
-            None => {
-                self.has_grown = true;
-                self.arrived.insert(site.clone(), state.clone());
-            }
-        }
-    }
-
-    /// Whether a jump or call may lead to a place that the text does not show.
-    fn leads_elsewhere(&self) -> bool {
-        self.is_open || self.targets.iter().any(|site| !self.places.contains(site))
-    }
-}
-
-/// A loop or branches that have not ended yet.
-#[derive(Debug)]
-pub(super) struct Structure {
-    kind: StructureKind,
-    /// The block that opens it.
-    block: u32,
-    /// Its name (O word of LinuxCNC).
-    name: Variable,
-    /// The number of the next branch.
-    branch: u32,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum StructureKind {
-    /// IF, until its ELSE.
-    If,
-    /// Behind ELSE.
-    Else,
-    /// The condition stands at the head.
-    While,
-    /// The condition stands at the end.
-    Until,
-    /// Left only by a jump.
-    Endless,
-}
 
 impl Interpreter<'_, '_> {
     /// Reads a file along its paths. False where they do not follow from the text.
@@ -309,9 +221,7 @@ impl Interpreter<'_, '_> {
         self.returns_are_common();
         let at = words.iter().position(|word| *word == b"GOTO").unwrap_or(words.len());
         match words.get(at + 1..).unwrap_or_default() {
-            [b"LBL", name] if !name.starts_with(b"Q") => {
-                self.depart(Site::Label(super::control_flow::label(name)))
-            }
+            [b"LBL", name] if !name.starts_with(b"Q") => self.depart(Site::Label(label(name))),
             _ => self.leads_anywhere(),
         }
     }
