@@ -4,8 +4,8 @@
 //! `rapid/flow`, NC in `nc/task`.
 //!
 //! Method: monotone frameworks with a worklist in reverse post-order (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999,
-//! §2.4 and §6.1). Loops need no fixpoint: what a loop changes is unknown at its head and after it, which holds for every number of
-//! iterations.
+//! §2.4 and §6.1). Loops of RAPID need no fixpoint: what a loop changes is unknown at its head and after it, which holds for every number
+//! of iterations. NC text has jumps instead, and is read until its joins no longer change (`nc/task/paths`).
 
 use std::collections::BTreeSet;
 

@@ -38,6 +38,7 @@ pub mod label;
 pub mod diff;
 pub mod motion;
 pub mod rewrite;
+pub mod remainder;
 pub mod draft;
 pub mod rapid;
 pub mod nc;

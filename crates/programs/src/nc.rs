@@ -29,6 +29,7 @@ mod modal_group;
 mod modal_state;
 mod task;
 mod rewrite;
+pub mod remainder;
 pub mod writer;
 
 pub use task::Task;

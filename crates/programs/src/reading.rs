@@ -4,7 +4,7 @@ use crate::edit::EditError;
 use crate::motion::Listing;
 use crate::motion::load::Loads;
 use crate::nc::setup::Setup;
-use crate::rapid::remainder::TextDifference;
+use crate::remainder::TextDifference;
 use crate::rewrite::{Change, RewriteOptions, Rewritten};
 use crate::{nc, rapid};
 
@@ -128,21 +128,28 @@ impl<'s> Program<'s> {
         }
     }
 
-    /// What a corrected version has differently from this original outside its motions, in words: no correction changes conditions, data or
-    /// signals. Of NC programs nothing is compared.
+    /// What a corrected version has differently from this original besides what corrections write, in words: no correction changes
+    /// conditions, data, signals or settings.
     pub fn text_differences(&self, corrected: &Program<'_>) -> Vec<String> {
-        let (Program::Rapid(original), Program::Rapid(corrected)) = (self, corrected) else {
-            return Vec::new();
+        let (found, besides) = match (self, corrected) {
+            (Program::Rapid(original), Program::Rapid(corrected)) => {
+                (corrected.text_differences(original), "outside any motion")
+            }
+            (Program::Nc(original), Program::Nc(corrected)) => {
+                (corrected.text_differences(original), "besides the words of positions")
+            }
+            _ => return Vec::new(),
         };
+        let names = &corrected.listing().files;
         let shown = |text: &str| if text.is_empty() { "nothing".to_owned() } else { format!("`{text}`") };
         let words = |found: TextDifference| {
             let TextDifference { file, line, here, original } = found;
-            let name = corrected.names.get(file).filter(|_| corrected.names.len() > 1);
+            let name = names.get(file).filter(|_| names.len() > 1);
             let place = name.map_or_else(|| format!("line {line}"), |name| format!("{name} line {line}"));
             let [here, original] = [shown(&here), shown(&original)];
-            format!("{place}: {here} here, {original} in the original, outside any motion")
+            format!("{place}: {here} here, {original} in the original, {besides}")
         };
-        corrected.text_differences(original).unwrap_or_default().into_iter().map(words).collect()
+        found.unwrap_or_default().into_iter().map(words).collect()
     }
 
     /// The loads that it states in addition to those of its tools. NC programs state none.

@@ -118,7 +118,7 @@ impl Compared<'_> {
         if let Some(mm) = self.joint_way_off_mm(index, partner) {
             found.push(partner, format!("joint targets that leave the line of the original by {mm:.1} mm"));
         }
-        // An NC block states few of these itself.
+        // The text of NC programs is compared word by word, and an inserted block near its neighbours may be taken for one of them here.
         if !original.numbered {
             self.compare_settings(index, partner, found);
         }

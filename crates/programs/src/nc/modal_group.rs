@@ -190,9 +190,11 @@ impl GroupTable {
             }
         }
         self.unknown_after_join |= other.unknown_after_join;
-        if other.unknown_by_word != 0 {
-            self.mark_unknown_by_word(other.unknown_by_word, other.word_reason);
+        // The first reason stays: joining the same states again then changes nothing.
+        if self.unknown_by_word == 0 {
+            self.word_reason = other.word_reason;
         }
+        self.unknown_by_word |= other.unknown_by_word;
     }
 
     /// G90.

@@ -383,6 +383,23 @@ impl ModalState {
         self.groups.mark_unknown_after_join(ALL_GROUPS & !constant);
     }
 
+    /// Forgets what depends on the motions before: modal groups, tools, offsets and variables stay as they are.
+    pub(super) fn forget_path(&mut self) {
+        let because = Reason::UnknownFlow;
+        self.mode = MotionMode::Unknown(because);
+        self.mode_before_cycle = self.mode;
+        self.feed.rate = Err(because);
+        self.pole = [Err(because); 2];
+        self.previous = None;
+        self.saved = None;
+        self.position = [Err(because); 3];
+        self.orientation = Orientation::unknown(because, Err(because));
+        if self.origin_set {
+            self.shift = [Err(because); 3];
+            self.groups.mark_unknown_after_join(ModalGroup::CoordinateShift.bit());
+        }
+    }
+
     /// After a word of unknown effect: every group may have any value.
     pub(super) fn invalidate_all(&mut self, because: Reason) {
         self.invalidate_flow(because);
@@ -475,6 +492,9 @@ impl Lattice for ModalState {
         if self.feed.per_minute != other.feed.per_minute {
             self.feed.rate = Err(Reason::UnknownFlow);
         }
+        // A stop that not every path has is none: motions that may blend belong to one cut.
+        self.feed.exact_stop &= other.feed.exact_stop;
+        self.feed.exact_stop_modal &= other.feed.exact_stop_modal;
         if self.saved != other.saved {
             self.saved = None;
         }

@@ -595,6 +595,11 @@ fn keeps_endpoint(reason: Reason) -> bool {
     )
 }
 
+/// Whether a correction may give a block words of positions: it moves the motion, or restates what the block omits.
+pub(super) fn may_get_words(motion: &Motion, context: &BlockContext) -> bool {
+    motion.own_reason.is_none_or(keeps_endpoint) || context.can_restate
+}
+
 fn via_of(motion: &Motion) -> Option<[f64; 3]> {
     let target = motion.via()?;
     match target.value {

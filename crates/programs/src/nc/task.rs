@@ -1,9 +1,11 @@
 //! Abstract interpretation of NC files: every motion block, with the modal state in which it runs.
 //!
 //! Blocks are interpreted in the order of the text ([`crate::dataflow`]); one that may be skipped is joined with the state
-//! before it. At a label, a loop or the start of a subprogram the state is joined with states of unseen predecessors, so that
-//! only modal groups which the whole file sets to one value stay known.
+//! before it. At a label, a loop or the start of a subprogram the states of all paths that lead there are joined ([`paths`]). Where
+//! they do not follow from the text, the state is joined with states of unseen predecessors, so that only modal groups which the
+//! whole file sets to one value stay known.
 
+mod arrivals;
 mod modal_codes;
 mod siemens_commands;
 mod invalidation;
@@ -16,6 +18,7 @@ mod m_words;
 mod motion;
 mod siemens_names;
 mod one_shot;
+mod paths;
 mod block;
 mod shift;
 mod file_scan;
@@ -42,6 +45,7 @@ use crate::dataflow::{Control, Nesting, Transfer};
 use crate::motion::{
     Frame, InvalidStatement, Listing, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
 };
+use arrivals::{Paths, Structure};
 use block::Block;
 pub(super) use block_context::{BlockArc, BlockContext, StartDependency, StateEvent};
 use call_edges::{CallEdges, FlowPoint};
@@ -106,6 +110,7 @@ impl<'s> Task<'s> {
                 Interpreter::new(&task.trees[file], file as u32, task.dialects[file], setup);
             // Siemens: the extension of a subprogram.
             interpreter.scan.is_subprogram = task.names[file].to_ascii_lowercase().ends_with(".spf");
+            interpreter.files = files.len();
             interpreter.listing = std::mem::take(&mut task.listing);
             interpreter.events = std::mem::take(&mut task.events);
             interpreter.contexts = std::mem::take(&mut task.contexts);
@@ -167,6 +172,10 @@ pub(super) struct Interpreter<'t, 's> {
     state: ModalState,
     /// The side effects of the whole file, from a first pass.
     file_effects: Option<FileEffects>,
+    /// What arrives at the places to which control comes from elsewhere; `None` where the text does not determine it.
+    paths: Option<Box<Paths>>,
+    /// How many files are read together.
+    files: usize,
     pass: Pass,
     /// Variables that the file has assigned so far.
     assigned_variables: HashSet<Variable>,
@@ -203,8 +212,16 @@ struct Pass {
     program_ended: bool,
     /// Whether synchronised actions may assign variables.
     synchronised_actions: bool,
-    /// The state before the subprogram that is being read.
-    state_before_subprogram: Option<ModalState>,
+    /// The state before the subprogram that is being read, and whether no path reaches it.
+    before_subprogram: Option<(ModalState, bool)>,
+    /// Whether no path that is known so far reaches the block.
+    unreached: bool,
+    /// The loops and branches around the block.
+    structures: Vec<Structure>,
+    /// The program that is being read, where it has a name.
+    program: Variable,
+    /// The labels that the next LBL 0 ends.
+    labels: Vec<Variable>,
     /// The program that a modal call calls after each motion.
     modal_callee: Option<Variable>,
     /// The last block of the contour that is being read.
@@ -238,10 +255,13 @@ impl Transfer for Interpreter<'_, '_> {
         self.has_nc_blocks |=
             !block.flags.opaque && (!block.g.is_empty() || !block.m.is_empty() || block.has_motion_words());
         self.in_skippable_block = nesting.guarded;
+        let unreached = self.pass.unreached;
         self.interpret(&block);
+        self.note_unreached(&block);
         self.block = Some(block);
         if nesting.guarded {
             self.in_skippable_block = false;
+            self.pass.unreached &= unreached;
             // A program end or jump in it happens only where it is not skipped.
             self.pass.program_ended = false;
             self.frame_index = None;
@@ -268,6 +288,8 @@ impl<'t, 's> Interpreter<'t, 's> {
             frames: HashMap::new(),
             state,
             file_effects: None,
+            paths: None,
+            files: 1,
             pass: Pass::default(),
             assigned_variables: HashSet::new(),
             block: None,
@@ -307,10 +329,12 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.interpret_file();
         if self.pass.branched {
             // The side effects of the whole file are known now; they determine what stays known at joins.
-            self.truncate_to(&lengths);
-            self.state = start;
             self.file_effects = Some(std::mem::take(&mut self.pass).effects);
-            self.interpret_file();
+            if !self.interpret_paths(&lengths, &start) {
+                self.truncate_to(&lengths);
+                (self.state, self.pass) = (start, Pass::default());
+                self.interpret_file();
+            }
         }
         // A text without one readable NC block is no program and has no motions.
         let unread =
@@ -466,7 +490,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             self.join_unseen_predecessors();
         }
         if self.is_reached_by_jumps(block) {
-            self.join_unseen_predecessors();
+            self.arrive_at_label(block);
             let is_number = block.words.first().is_some_and(|word| word.address() == Some(b'N'));
             // REPEAT repeats up to a label.
             self.flow(if is_number { FlowPoint::Arrives } else { FlowPoint::Joins });
@@ -489,7 +513,11 @@ impl<'t, 's> Interpreter<'t, 's> {
         if self.dialect == Dialect::Heidenhain && self.heidenhain(block) {
             return;
         }
+        if self.jumps_in_passing(block) {
+            self.leads_anywhere();
+        }
         if self.is_action(block) {
+            self.leads_anywhere();
             // A synchronised action may set its variables at any time from here on.
             self.pass.synchronised_actions = true;
             self.state.variables.invalidate(Reason::UnknownVariable);
@@ -556,6 +584,11 @@ impl<'t, 's> Interpreter<'t, 's> {
         if block.m.iter().any(|m| matches!(m, 46 | 96 | 99)) {
             let returns = block.m.contains(&99) && block.p.is_none();
             self.branch_by(if returns { FlowPoint::Return } else { FlowPoint::Leaves });
+            if returns && !block.m.iter().any(|m| matches!(m, 46 | 96)) {
+                self.returns_from(vec![self.pass.program.clone()]);
+            } else if dialect != Dialect::Heidenhain {
+                self.leads_anywhere();
+            }
         }
         if self.dialect == Dialect::Heidenhain && block.m.contains(&129) {
             // It takes effect at the end of its block.
@@ -563,6 +596,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         }
         if block.m.iter().any(end) || block.words.iter().any(|word| word.is("RET")) {
             self.pass.program_ended = true;
+            self.stop();
             if !block.m.contains(&99) {
                 self.flow(FlowPoint::Return);
             }

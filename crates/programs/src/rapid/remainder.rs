@@ -6,22 +6,7 @@ use super::lexer::lex;
 use super::task::Task;
 use super::token::{Token, folded};
 use crate::motion::Span;
-
-/// The first place at which two versions of a file differ outside their motions.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TextDifference {
-    /// Its file, by index.
-    pub file: usize,
-    /// Its line in the changed version, from 1.
-    pub line: u32,
-    /// The text of that line; empty at the end of the file.
-    pub here: String,
-    /// The text of the line of the original.
-    pub original: String,
-}
-
-/// Most characters of a line that a difference shows.
-const SHOWN: usize = 60;
+use crate::remainder::{TextDifference, Version, first_difference};
 
 impl Task<'_> {
     /// For each file with one the first difference from the original outside motions and declared targets; `None` where the two have not
@@ -89,30 +74,7 @@ fn declaration(statement: &[(Vec<u8>, usize)], declared: &HashSet<Vec<u8>>) -> O
 
 fn difference([changed, original]: [&Task<'_>; 2], file: usize) -> Option<TextDifference> {
     let declared = declared([changed, original]);
-    let [mut here, mut there] = [changed, original].map(|task| tokens(task, file, &declared).into_iter());
-    loop {
-        let [a, b] = [here.next(), there.next()];
-        if a.as_ref().map(|(text, _)| text) == b.as_ref().map(|(text, _)| text) {
-            a?;
-            continue;
-        }
-        let shown = |task: &Task<'_>, at: Option<usize>| {
-            let source = task.sources[file];
-            let at = at.unwrap_or(source.len());
-            let begin = source[..at].iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
-            let end =
-                source[at..].iter().position(|byte| *byte == b'\n').map_or(source.len(), |end| at + end);
-            let text = String::from_utf8_lossy(source[begin..end].trim_ascii());
-            text.chars().take(SHOWN).collect::<String>()
-        };
-        let [at, was_at] = [a, b].map(|token| token.map(|(_, start)| start));
-        let source = changed.sources[file];
-        let lines = source[..at.unwrap_or(source.len())].iter().filter(|byte| **byte == b'\n').count();
-        return Some(TextDifference {
-            file,
-            line: lines as u32 + 1,
-            here: shown(changed, at),
-            original: shown(original, was_at),
-        });
-    }
+    let versions = [changed, original]
+        .map(|task| Version { source: task.sources[file], words: tokens(task, file, &declared) });
+    first_difference(file, versions)
 }

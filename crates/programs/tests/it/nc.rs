@@ -21,9 +21,11 @@ mod blocks;
 mod frames;
 mod heidenhain;
 mod line_length;
+mod paths;
 mod position_dependencies;
 mod m_words;
 mod unmodified;
+mod remainder;
 mod subprograms;
 
 const DIALECTS: [Dialect; 5] =
@@ -390,9 +392,11 @@ fn at_a_join_only_groups_with_one_value_in_the_file_stay_known() {
     assert_eq!(found[1], Err(Reason::UnknownFlow), "the motion word is forgotten at a jump's aim");
     assert_eq!(found[2], Ok([2.0, 2.0, 2.0]));
     assert_eq!(found[3], Ok([3.0, 2.0, 2.0]));
-    // With both G90 and G91 in the file the meaning of numbers is unknown.
-    let found = ends(&format!("{body}G91 X1\n"), Dialect::LinuxCnc);
+    // With both G90 and G91 on the paths the meaning of numbers is unknown; what only follows the loop is not on its paths.
+    let found = ends(&body.replace("IF", "G91 X1\nIF"), Dialect::LinuxCnc);
     assert_eq!(found[2], Err(Reason::UnknownFlow));
+    let found = ends(&format!("{body}G91 X1\n"), Dialect::LinuxCnc);
+    assert_eq!(found[2], Ok([2.0, 2.0, 2.0]));
     // So is the value of a variable that is set conditionally.
     let found = ends("#1=5\n#2=4\nIF [#2 EQ 1] THEN #1=7\nG1 X#1 Y2 Z3 A0 B0 C0\nX#2 Y2 Z3\n", Dialect::Iso);
     assert_eq!(found, [Err(Reason::UnknownFlow), Ok([4.0, 2.0, 3.0])]);

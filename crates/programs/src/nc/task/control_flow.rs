@@ -5,7 +5,9 @@ use super::super::expression::{Evaluated, Variable, numbered};
 use super::super::modal_group::ModalGroup;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
+use super::arrivals::{Site, is_label, label};
 use super::call_edges::program_of;
+use super::paths::is_jump;
 use super::siemens_names::{AddressEffect, address_effect};
 use super::{Block, FlowPoint, Interpreter, StateEvent};
 use crate::motion::Reason;
@@ -238,19 +240,13 @@ impl Interpreter<'_, '_> {
         match (&*name, first.address()) {
             (_, Some(b'O')) if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) => {
                 // A program number: execution starts at the first one.
-                if !self.contexts.is_empty() {
-                    self.join_unseen_predecessors();
-                }
-                self.flow(FlowPoint::Program(self.program_name(first)));
+                self.program_number(first);
                 // Other words may follow on its line.
                 block.words.iter().filter(|word| word.address() != Some(b'N')).count() == 1
             }
             // A program number stands alone; with other words it is a block number.
             (b":", _) if block.words.len() == 1 => {
-                if !self.contexts.is_empty() {
-                    self.join_unseen_predecessors();
-                }
-                self.flow(FlowPoint::Program(self.program_name(first)));
+                self.program_number(first);
                 true
             }
             (b"PROC", _) => {
@@ -261,8 +257,7 @@ impl Interpreter<'_, '_> {
                 true
             }
             (b"IF", _) => {
-                // The branch may jump away; the state here is that of the path that does not.
-                self.branch();
+                self.condition(block);
                 true
             }
             (
@@ -270,12 +265,14 @@ impl Interpreter<'_, '_> {
                 | b"ENDLOOP" | b"REPEAT" | b"UNTIL" | b"CASE",
                 _,
             ) => {
-                self.join_unseen_predecessors();
+                self.structure(&name, Variable::new(), block);
                 self.flow(FlowPoint::Joins);
                 true
             }
             _ if name.starts_with(b"GOTO") => {
                 self.branch();
+                self.jump(block);
+                self.stop();
                 true
             }
             _ if name.starts_with(b"REPEAT") => {
@@ -301,7 +298,12 @@ impl Interpreter<'_, '_> {
                 self.subprogram(block, "L");
                 true
             }
-            (b"DEF" | b"EXTERN" | b"DEFINE", _) => true,
+            // A macro may stand for a jump.
+            (b"DEFINE", _) => {
+                self.leads_anywhere();
+                true
+            }
+            (b"DEF" | b"EXTERN", _) => true,
             _ => false,
         }
     }
@@ -311,17 +313,24 @@ impl Interpreter<'_, '_> {
         let keyword = block.words.get(1).map(|word| word.name.to_ascii_uppercase()).unwrap_or_default();
         match &*keyword {
             b"CALL" => self.subprogram(block, "O call"),
-            b"IF" => self.branch(),
+            b"IF" => self.structure(b"IF", self.word_text(&block.words[0]), block),
             b"SUB" => {
-                let state_before_subprogram = self.state.clone();
-                self.join_unseen_predecessors();
-                self.flow(FlowPoint::Program(self.word_text(&block.words[0])));
-                self.pass.state_before_subprogram = Some(state_before_subprogram);
+                let before = (self.state.clone(), self.pass.unreached);
+                let name = self.word_text(&block.words[0]);
+                if self.pass.before_subprogram.is_some() {
+                    self.leads_anywhere();
+                }
+                self.begin_program(&name, self.scan.is_subprogram || self.files > 1);
+                self.arrive_from_elsewhere(Site::Program(name.clone()));
+                self.flow(FlowPoint::Program(name));
+                self.pass.before_subprogram = Some(before);
             }
             // The main path bypasses a subprogram, whose state holds only where it is called.
-            b"ENDSUB" if self.pass.state_before_subprogram.is_some() => {
-                if let Some(state) = self.pass.state_before_subprogram.take() {
-                    self.state = state;
+            b"ENDSUB" if self.pass.before_subprogram.is_some() => {
+                let program = std::mem::take(&mut self.pass.program);
+                self.returns_from(vec![program]);
+                if let Some((state, unreached)) = self.pass.before_subprogram.take() {
+                    (self.state, self.pass.unreached) = (state, unreached);
                 }
                 self.pass.program_ended = false;
                 self.frame_index = None;
@@ -330,12 +339,49 @@ impl Interpreter<'_, '_> {
                 self.flow(FlowPoint::EndOfSubprogram);
             }
             b"RETURN" => {
-                self.join_unseen_predecessors();
+                if self.paths.is_some() {
+                    self.returns_from(vec![self.pass.program.clone()]);
+                    self.stop();
+                    self.events.push(StateEvent::Branch);
+                } else {
+                    self.join_unseen_predecessors();
+                }
                 self.flow(FlowPoint::Return);
             }
             _ => {
-                self.join_unseen_predecessors();
+                self.structure(&keyword, self.word_text(&block.words[0]), block);
                 self.flow(FlowPoint::Joins);
+            }
+        }
+    }
+
+    /// A program number: execution starts at the first one.
+    fn program_number(&mut self, first: &Word<'_>) {
+        let name = self.program_name(first);
+        let site = Site::Program(name.clone());
+        let is_first = self.pass.program.is_empty() && self.contexts.is_empty();
+        self.begin_program(&name, !is_first && self.files > 1);
+        if !self.contexts.is_empty() || self.is_target(&site) {
+            self.arrive(site);
+        }
+        self.flow(FlowPoint::Program(name));
+    }
+
+    /// IF: where a jump follows, the state here is that of the path that does not take it.
+    fn condition(&mut self, block: &Block<'_>) {
+        if block.words.iter().any(is_jump) {
+            self.branch();
+            return self.jump(block);
+        }
+        let then = block.words.iter().position(|word| word.is("THEN"));
+        match then.map(|then| &block.words[then + 1..]) {
+            // IF […] THEN #1=2
+            Some(rest) if !rest.is_empty() && rest.iter().all(|word| word.assigned) => self.branch(),
+            Some([]) => self.structure(b"IF", Variable::new(), block),
+            None if self.dialect == Dialect::Siemens => self.structure(b"IF", Variable::new(), block),
+            _ => {
+                self.branch();
+                self.leads_anywhere();
             }
         }
     }
@@ -345,14 +391,14 @@ impl Interpreter<'_, '_> {
     pub(super) fn subprogram(&mut self, block: &Block<'_>, name: &str) {
         let callee = self.callee(block);
         let is_own = match &callee {
-            Some(name) => name.starts_with(LABEL) || self.scan.programs.contains(name),
+            Some(name) => is_label(name) || self.scan.programs.contains(name),
             None => true,
         };
         if !is_own {
             self.listing.nc.external_calls.push(self.listing.motions.len() as u32);
         }
         self.list_left(block, name, Reason::Subprogram);
-        self.join_unseen_predecessors();
+        self.call(block, callee.as_ref(), is_own);
         let (next, may_skip) = (self.listing.motions.len() as u32, block.flags.skippable);
         self.call_edges.push(FlowPoint::Call { callee, may_skip }, self.file, next, true);
     }
@@ -416,15 +462,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// The text of a word, in upper case.
-    fn word_text(&self, word: &Word<'_>) -> Variable {
+    pub(super) fn word_text(&self, word: &Word<'_>) -> Variable {
         self.tree.source()[self.tree.range(word.first, word.end)].to_ascii_uppercase()
     }
-}
-
-/// What the names of labels begin with.
-const LABEL: &[u8] = b"LBL ";
-
-/// The name of a label of Heidenhain.
-pub(super) fn label(name: &[u8]) -> Variable {
-    [LABEL, name].concat()
 }

@@ -6,8 +6,8 @@ use super::super::modal_group::ModalGroup;
 use super::super::modal_state::MotionMode;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
+use super::arrivals::{Site, label};
 use super::block::Flags;
-use super::control_flow::label;
 use super::{Block, FlowPoint, Interpreter, StartDependency};
 use crate::motion::Reason;
 use truegrind_math::se3::Pose;
@@ -125,11 +125,17 @@ impl<'s> Interpreter<'_, 's> {
             b"CYCL" => self.cycle_block(block, first, &words),
             b"FN" | b"Q" | b"QL" | b"QR" => self.function_block(block, first, &text, &words),
             b"LBL" if second != b"0" => {
-                self.join_unseen_predecessors();
-                self.flow(FlowPoint::Label(label(second)));
+                let name = label(second);
+                self.arrive(Site::Label(name.clone()));
+                self.pass.labels.push(name.clone());
+                self.flow(FlowPoint::Label(name));
                 self.state.mode = MotionMode::Unknown(Reason::UnknownFlow);
             }
-            b"LBL" => self.branch_by(FlowPoint::Return),
+            b"LBL" => {
+                let labels = std::mem::take(&mut self.pass.labels);
+                self.returns_from(labels);
+                self.branch_by(FlowPoint::Return);
+            }
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
                 self.subprogram(block, "CALL");
             }
@@ -256,6 +262,7 @@ impl<'s> Interpreter<'_, 's> {
         // FN 9 to FN 12 jump: later settings may be bypassed.
         if words.contains(&&b"GOTO"[..]) {
             self.branch();
+            self.jump_to_label(words);
         }
         self.parameter(first);
     }

@@ -186,6 +186,8 @@ impl Interpreter<'_, '_> {
     /// Default-deny: a block with an unknown word is listed, and the whole modal state is unknown from here on.
     pub(super) fn list_unknown_word(&mut self, block: &Block<'_>, word: &str, reason: Reason) {
         self.list_left(block, word, reason);
+        // It may have been a jump.
+        self.leads_anywhere();
         self.state.invalidate_all(reason);
         // It may have been a motion code.
         self.state.mode = MotionMode::Unknown(reason);

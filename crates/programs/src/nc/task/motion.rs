@@ -341,8 +341,12 @@ impl Interpreter<'_, '_> {
             if !self.dialect.paren_comments() {
                 self.listing.nc.external_calls.push(self.listing.motions.len() as u32 - 1);
             }
-            self.join_unseen_predecessors();
             let callee = Some(self.pass.modal_callee.clone().unwrap_or_default());
+            let may_be_own = |name: &Vec<u8>| name.is_empty() || self.scan.programs.contains(name);
+            if call == Some(Reason::Subprogram) && callee.as_ref().is_some_and(may_be_own) {
+                self.leads_anywhere();
+            }
+            self.join_unseen_predecessors();
             self.flow(FlowPoint::Call { callee, may_skip: false });
             self.state.modal_call = call;
         } else if (machine || block.unmodelled.is_some())

@@ -135,10 +135,14 @@ fn the_position_is_unknown_after_a_change_of_coordinates() {
             ("G1 U-2.\nX5.", &[left(ExternalOnly), p]),
             ("X30. ,A45.\nX5.", &[left(UnsupportedPath), p]),
             (&format!("/M99 P100\nG55\nN100 {F}"), &[left(UnknownFlow)]),
-            // In a program that leaves G91 active, the first block of a subprogram has an unknown end.
+            // Where the first of several calls leaves G91 active, the first block of the subprogram has an unknown end.
+            (
+                "M98 P1000 L2\nM30\nO1000\nX5.\nG1 X5. Y5. Z5. A180. B0. C0.\nG91 X1.\nM99",
+                &[left(Subprogram), left(UnknownFlow), left(UnknownFlow), left(PositionUnknown)],
+            ),
             (
                 "M98 P1000\nM30\nO1000\nX5.\nG1 X5. Y5. Z5. A180. B0. C0.\nG91 X1.\nM99",
-                &[left(Subprogram), left(UnknownFlow), left(UnknownFlow), left(UnknownFlow)],
+                &[left(Subprogram), left(UnknownFlow), None, None],
             ),
         ],
     );
@@ -419,13 +423,15 @@ fn assignments_of_a_called_program_are_unknown_after_the_call() {
         task.listing.motions[call + 1].reason()
     };
     assert_eq!(after("", "G4 X1."), None);
-    for set in ["G10 L2 P1 X5. Y0. Z0.", "G10 L2 P1 X[#5221+5.]", "#5221=5."] {
+    assert_eq!(after("", "G10 L2 P1 X5. Y0. Z0."), None, "the only path sets it");
+    for set in ["G10 L2 P1 X[#5221+5.]", "#5221=5.", "/G10 L2 P1 X5. Y0. Z0."] {
         assert_eq!(after("", set), Some(WorkObjectAssigned), "{set}");
     }
     assert_ne!(after("", "G10 L11 P1 R50."), None, "the length of the tool");
-    // A value set before the first branch, and nowhere else, holds at every join.
+    // All paths agree.
     assert_eq!(after("G10 L2 P1 X500. Y0. Z200.", "G4 X1."), None);
-    assert_eq!(after("G10 L2 P1 X500. Y0. Z200.", "G10 L2 P1 X500. Y0. Z200."), Some(WorkObjectAssigned));
+    assert_eq!(after("G10 L2 P1 X500. Y0. Z200.", "G10 L2 P1 X500. Y0. Z200."), None);
+    assert_eq!(after("/G10 L2 P1 X5. Y0. Z0.", "G4 X1."), Some(WorkObjectAssigned));
 }
 
 #[test]

@@ -31,15 +31,20 @@ fn a_datum_shift_over_several_lines_is_known_after_the_last() {
         format!("CYCL DEF 7.0 DATUM SHIFT\n{}", lines.iter().enumerate().map(line).collect::<String>())
     };
     let shift = Some([-60.0, 0.0, 0.0]);
-    // After a call a shift is unknown, until each axis is stated.
+    // After a row of the table a shift is unknown, until each axis is stated.
     for before in ["", "CALL LBL 1\n", "TRANS DATUM TABLE TABLINE1\n"] {
         for lines in [&["X-60", "Y+0", "Z+0"][..], &["Y+0", "X-60", "Z+0"], &["X-60 Y+0 Z+0"]] {
             let body = format!("{before}{}{l}\nLBL 1\nCYCL DEF 7.1 Z+5\nLBL 0", cycle(lines));
             assert_eq!(shifted(&body), (None, shift), "{body}");
         }
         let body = format!("{before}{}{l}\nLBL 1\nCYCL DEF 7.1 Z+5\nLBL 0", cycle(&["X-60", "Y+0"]));
-        let found = shifted(&body);
-        assert_eq!(found.0, if before.is_empty() { None } else { left(Transformed) }, "{body}");
+        let expected = match before {
+            "" => (None, shift),
+            // The label has shifted Z.
+            "CALL LBL 1\n" => (None, Some([-60.0, 0.0, 5.0])),
+            _ => (left(Transformed), None),
+        };
+        assert_eq!(shifted(&body), expected, "{body}");
     }
     // An unreadable number, a row of the table, an increment to an unknown value.
     for line in
