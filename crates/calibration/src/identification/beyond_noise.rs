@@ -5,7 +5,9 @@ use serde::Serialize;
 
 use crate::measurement::dataset::Sensor;
 use crate::measurement::noise_floor::NoiseFloor;
-use truegrind_arm::estimated::StageErrors;
+use truegrind_arm::estimated::beyond_noise::ErringArm;
+use truegrind_arm::estimated::{Estimated, StageErrors};
+use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 
 /// Error of a position (mm RMS) that a model leaves.
@@ -123,4 +125,18 @@ impl BeyondNoise {
             Self::AtMost(_) => None,
         }
     }
+}
+
+fn erring(estimated: &Estimated) -> ErringArm<'_> {
+    let Estimated { model, condition, region, .. } = estimated;
+    ErringArm { model, condition, samples_deg: &region.samples_deg }
+}
+
+/// The errors of the joints' angles (rad) that move the target by `beyond_mm`, over the region of the arm.
+pub(crate) fn joint_errors_rad(
+    estimated: &Estimated,
+    flange_from_target: &Pose,
+    beyond_mm: f64,
+) -> Option<[f64; 6]> {
+    erring(estimated).joint_errors_rad(flange_from_target, beyond_mm)
 }

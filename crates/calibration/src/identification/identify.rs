@@ -5,7 +5,7 @@ use thiserror::Error;
 use rayon::prelude::*;
 
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
-use crate::identification::beyond_noise::BeyondNoise;
+use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
     Fitted, Observations, Outliers, Start, WRONG_ORIENTATION_RAD, errors_on, fit, frame_parameters,
@@ -234,6 +234,7 @@ pub fn identify(
         geometry: trained.geometry,
         noise_floor_mm: noise_floor(repeats.as_ref(), &observed, &geometry),
         beyond_noise_mm: None,
+        beyond_noise_rad: None,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region,
         condition: mean_condition(dataset),
@@ -245,6 +246,9 @@ pub fn identify(
         BeyondNoise::of(&trained.geometry, geometry.parameters.len(), sensor, repeats.as_ref())
             .less_rounding(estimated.noise_floor_mm, sensor);
     estimated.beyond_noise_mm = beyond_noise.known_mm();
+    estimated.beyond_noise_rad = estimated
+        .beyond_noise_mm
+        .and_then(|mm| joint_errors_rad(&estimated, &geometry.frames.flange_from_target, mm));
     let benefit = variance_inflation.map(|variance_inflation| {
         benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
             .map(|benefit| benefit.with_unmodelled(beyond_noise))
