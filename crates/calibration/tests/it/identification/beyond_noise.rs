@@ -126,11 +126,11 @@ fn erring(rad: &[f64; 6], target_mm: f64, seed: u64) -> Dataset {
 
 /// On the axis of joint 6 the target does not see that joint err, and the others less than a tool does.
 #[test]
-fn what_the_target_saw_is_an_error_of_the_joints() {
+fn what_the_target_saw_is_stated_for_a_longer_tool() {
     // Smaller gears err by more.
     const RAD: [f64; 6] = [1e-4, 1e-4, 1e-4, 2e-4, 3e-4, 3e-4];
     let halves = |rows: &Dataset| split::random(rows, 0.2, 0);
-    for (seed, target_mm) in [(1, 20.0), (2, 20.0), (3, 400.0)] {
+    for (seed, target_mm, is_told) in [(1, 20.0, true), (2, 20.0, true), (3, 400.0, false)] {
         let dataset = erring(&RAD, target_mm, seed);
         let found =
             identify(&dataset, "arm", &arm(), &start(&dataset), &halves, &Options::default()).unwrap();
@@ -142,5 +142,7 @@ fn what_the_target_saw_is_an_error_of_the_joints() {
         let stated = erring.displacement_mm(&tool, &estimated.beyond_noise_rad.unwrap());
         let ratio = erring.displacement_mm(&tool, &RAD) / stated;
         assert!((1.0 / 1.3..1.3).contains(&ratio), "seed {seed}: true over stated {ratio}");
+        let told = estimated.verdict.reasons.iter().any(|reason| reason.contains("tool tip 300 mm in front"));
+        assert_eq!(told, is_told, "seed {seed}: {:?}", estimated.verdict.reasons);
     }
 }
