@@ -163,6 +163,7 @@ fn estimated(joints: &[Joints]) -> Estimated {
         geometry: still,
         noise_floor_mm: None,
         beyond_noise_mm: None,
+        beyond_noise_rad: None,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region::of(&measured, 1.0),
         condition: Condition::default(),

@@ -2,6 +2,7 @@
 //!
 //! The TOML file of an estimated arm is complete: it contains the nominal arm too, so it suffices to correct programs.
 
+pub mod beyond_noise;
 mod checks;
 mod error;
 mod file;
@@ -146,6 +147,9 @@ pub struct Estimated {
     pub noise_floor_mm: Option<f64>,
     /// RMS error of a position that the model leaves beyond the noise (mm); absent where the noise is unknown.
     pub beyond_noise_mm: Option<f64>,
+    /// The same as errors of the joints' angles (rad, 1 σ) that move the measured target by as much ([`beyond_noise`]): what is counted
+    /// in every σ. Absent where the noise is unknown, and in files of earlier versions.
+    pub beyond_noise_rad: Option<[f64; 6]>,
     /// The judgement.
     pub verdict: Verdict,
     /// Where the arm was measured.
@@ -161,12 +165,15 @@ pub struct RegisteredFrame {
     pub origin_mm: Vector3<f64>,
     /// Its twist in the base per unit of each parameter of the covariance: velocity of the origin, angular velocity.
     pub twists: Vec<Vector6<f64>>,
+    /// Share of the variance of the errors beyond the noise ([`beyond_noise`]) that is left of a point relative to the frame: 1 where
+    /// the frame does not follow them.
+    pub beyond_share: f64,
 }
 
 impl RegisteredFrame {
     /// The frame with its twists borrowed.
     pub fn carried(&self) -> CarriedFrame<'_> {
-        CarriedFrame { origin_mm: self.origin_mm, twists: &self.twists }
+        CarriedFrame { origin_mm: self.origin_mm, twists: &self.twists, beyond_share: self.beyond_share }
     }
 }
 
@@ -177,6 +184,8 @@ pub struct CarriedFrame<'a> {
     pub origin_mm: Vector3<f64>,
     /// See [`RegisteredFrame::twists`].
     pub twists: &'a [Vector6<f64>],
+    /// See [`RegisteredFrame::beyond_share`].
+    pub beyond_share: f64,
 }
 
 /// A point on the flange whose predicted σ is computed.
@@ -337,7 +346,7 @@ impl Estimated {
     }
 
     /// Predicted standard deviation of the position of a point on the flange (mm): √trace(J Σ Jᵀ), the double sum of
-    /// Σᵢⱼ vᵢ·vⱼ over the velocities that the arm's parameters give the point.
+    /// Σᵢⱼ vᵢ·vⱼ over the velocities that the arm's parameters give the point, and the errors beyond the noise ([`beyond_noise`]).
     ///
     /// With `carried`, relative to a registered frame: common motion of point and frame cancels.
     pub fn position_sigma_mm(
@@ -372,6 +381,15 @@ impl Estimated {
         };
         for (block, first) in points.chunks(WIDTH).zip((0..).step_by(WIDTH)) {
             let at = self.velocities_in_base(arm, block, &mut velocities);
+            let beyond: [f64; WIDTH] = match &self.beyond_noise_rad {
+                Some(rad) => std::array::from_fn(|k| {
+                    block.get(k).map_or(0.0, |point| {
+                        beyond_noise::square_mm2(arm, &point.joints, &point.flange_from_tool, rad)
+                    })
+                }),
+                None => [0.0; WIDTH],
+            };
+            let share = |carried: Option<CarriedFrame<'_>>| carried.map_or(1.0, |frame| frame.beyond_share);
             let other = |k: usize| others.get(first + k).copied().flatten();
             let second = (0..block.len()).any(|k| other(k).is_some()).then(|| {
                 relative.copy_from_slice(&velocities);
@@ -381,8 +399,12 @@ impl Estimated {
             subtract_carried(&at, block.len(), |k| block[k].carried, &mut velocities);
             let variance = variances(&velocities);
             out.extend((0..block.len()).map(|k| {
-                let second = second.as_ref().filter(|_| other(k).is_some());
-                (root(variance[k]), second.map(|second| root(second[k])))
+                let second = second.as_ref().zip(other(k));
+                let with_beyond = |variance: f64, carried| root(variance + share(carried) * beyond[k]);
+                (
+                    with_beyond(variance[k], block[k].carried),
+                    second.map(|(second, carried)| with_beyond(second[k], carried)),
+                )
             }));
         }
         out

@@ -1,6 +1,7 @@
 //! What the model knows of a program: where its path lies, how likely a correction does harm, and what measurement would help.
 
 pub(crate) mod assessment;
+pub(crate) mod beyond_noise;
 pub mod cut_risk;
 pub(crate) mod fixtures;
 pub(crate) mod measurement_information;

@@ -14,6 +14,7 @@ use crate::region::Region;
 use truegrind_math::statistics::ErrorSummary;
 
 const ERROR_MM: Bound = Bound::new(0.0, 1e6, "an error in mm, 0 or more");
+const ERROR_RAD: Bound = Bound::new(0.0, 1.0, "an error of an angle in rad, 0 to 1");
 const SIGNED_MM: Bound = Bound::new(-1e6, 1e6, "an error in mm, within ±1,000,000");
 const SIGMA_MM: Bound = Bound::new(0.0, 1e4, "a standard deviation in mm, 0 to 10,000");
 const SIGMA: Bound = Bound::new(0.0, 1e6, "a standard deviation, 0 or more");
@@ -43,6 +44,9 @@ pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
     }
     if let Some(beyond) = model.beyond_noise_mm {
         ERROR_MM.check(|| "beyond_noise_mm".to_owned(), beyond)?;
+    }
+    for beyond in model.beyond_noise_rad.iter().flatten() {
+        ERROR_RAD.check(|| "beyond_noise_rad".to_owned(), *beyond)?;
     }
     if let Some(floor) = model.noise_floor_mm {
         ERROR_MM.check(|| "noise_floor_mm".to_owned(), floor)?;

@@ -27,6 +27,7 @@ impl Estimated {
             geometry: self.geometry,
             noise_floor_mm: self.noise_floor_mm,
             beyond_noise_mm: self.beyond_noise_mm,
+            beyond_noise_rad: self.beyond_noise_rad,
             region: self.region.clone(),
             condition: self.condition,
             nominal: ArmFile::from(&self.nominal),
@@ -69,6 +70,7 @@ impl Estimated {
     /// #     geometry: stage,
     /// #     noise_floor_mm: None,
     /// #     beyond_noise_mm: None,
+    /// #     beyond_noise_rad: None,
     /// #     verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
     /// #     region: Region::of(&[Joints::zeros(), Joints::repeat(0.5)], 0.1),
     /// #     condition: Condition::default(),
@@ -127,6 +129,7 @@ impl Estimated {
             geometry: file.geometry,
             noise_floor_mm: file.noise_floor_mm,
             beyond_noise_mm: file.beyond_noise_mm,
+            beyond_noise_rad: file.beyond_noise_rad,
             verdict: file.verdict,
             region: file.region,
             condition: file.condition,
@@ -167,6 +170,8 @@ struct ModelFile {
     noise_floor_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     beyond_noise_mm: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    beyond_noise_rad: Option<[f64; 6]>,
     provenance: Provenance,
     verdict: Verdict,
     condition: Condition,

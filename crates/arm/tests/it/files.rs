@@ -133,6 +133,7 @@ fn complete() -> Estimated {
         geometry: stage,
         noise_floor_mm: Some(0.02),
         beyond_noise_mm: None,
+        beyond_noise_rad: Some([1e-4, 1e-4, 1e-4, 2e-4, 2e-4, 3e-4]),
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region::of(&joints, 1.0),
         condition: Condition {

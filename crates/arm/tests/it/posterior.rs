@@ -72,6 +72,7 @@ fn arm(ratio: [f64; 3], width_uncertainty: Option<WidthUncertainty>) -> Estimate
         geometry: stage,
         noise_floor_mm: None,
         beyond_noise_mm: None,
+        beyond_noise_rad: None,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region::of(&[Joints::zeros(), Joints::repeat(0.5)], 0.1),
         condition: Condition::default(),

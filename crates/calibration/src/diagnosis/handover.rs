@@ -13,7 +13,7 @@ use super::sensor_causes::{self, probability_worse};
 use super::validation::StageError;
 use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
-use crate::identification::beyond_noise::BeyondNoise;
+use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
 use crate::identification::fit::Fitted;
 use crate::identification::identify::{
     self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition,
@@ -159,6 +159,11 @@ impl Handover<'_> {
         let [fitted, handed] = &[arm.fitted, arm.with_uncertain].map(|fit| self.widened(fit));
         let beyond_noise = self.beyond_noise_of(arm);
         let mut estimated = self.without_verdict(fitted, handed, arm.errors, beyond_noise);
+        // What the written arm lacks of the causes stands in its covariance: only what all of them leave comes on top.
+        estimated.beyond_noise_rad = self
+            .beyond_noise
+            .known_mm()
+            .and_then(|mm| joint_errors_rad(&estimated, &fitted.frames.flange_from_target, mm));
         in_doubt::add_missing_errors(&mut estimated, self.missing_errors(arm));
         let mut estimated = with_sigma_in_region(estimated, handed);
         let benefit = match &self.few_poses {
@@ -258,6 +263,7 @@ impl Handover<'_> {
             geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
             noise_floor_mm: self.noise_floor_mm,
             beyond_noise_mm: beyond_noise.known_mm(),
+            beyond_noise_rad: None,
             verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
             region: Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0),
             condition: mean_condition(dataset),

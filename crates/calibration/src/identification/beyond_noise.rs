@@ -5,7 +5,9 @@ use serde::Serialize;
 
 use crate::measurement::dataset::Sensor;
 use crate::measurement::noise_floor::NoiseFloor;
-use truegrind_arm::estimated::StageErrors;
+use truegrind_arm::estimated::beyond_noise::ErringArm;
+use truegrind_arm::estimated::{Estimated, StageErrors};
+use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 
 /// Error of a position (mm RMS) that a model leaves.
@@ -123,4 +125,37 @@ impl BeyondNoise {
             Self::AtMost(_) => None,
         }
     }
+}
+
+fn erring(estimated: &Estimated) -> ErringArm<'_> {
+    let Estimated { model, condition, region, .. } = estimated;
+    ErringArm { model, condition, samples_deg: &region.samples_deg }
+}
+
+/// The errors of the joints' angles (rad) that move the target by `beyond_mm`, over the region of the arm.
+pub(crate) fn joint_errors_rad(
+    estimated: &Estimated,
+    flange_from_target: &Pose,
+    beyond_mm: f64,
+) -> Option<[f64; 6]> {
+    erring(estimated).joint_errors_rad(flange_from_target, beyond_mm)
+}
+
+/// Distance of a tip from the flange for which its error is stated (mm).
+const TIP_MM: f64 = 300.0;
+
+/// How many times that of the target it is from which it is stated.
+const STATED_FROM: f64 = 1.3;
+
+/// What the errors beyond the noise, of which the target saw `beyond_mm`, make of a longer tool; `None` where the target is as far out.
+pub(crate) fn longer_tool(estimated: &Estimated, beyond_mm: f64) -> Option<String> {
+    let tip = Pose::translation(0.0, 0.0, TIP_MM);
+    let tip_mm = erring(estimated).displacement_mm(&tip, &estimated.beyond_noise_rad?);
+    (tip_mm > STATED_FROM * beyond_mm).then(|| {
+        format!(
+            "the target sits close to the flange: what the model does not contain moves it by {beyond_mm:.3} mm, and a tool tip {TIP_MM:.0} mm in \
+             front of the flange by some {tip_mm:.3} mm (RMS, if it is errors of the joints' angles), one that is off the axis of joint 6 by more; \
+             compensate counts this for the tool of each program"
+        )
+    })
 }

@@ -5,7 +5,7 @@ use thiserror::Error;
 use rayon::prelude::*;
 
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
-use crate::identification::beyond_noise::BeyondNoise;
+use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad, longer_tool};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
     Fitted, OUTLIER_CUT, Observations, Outliers, Start, WRONG_ORIENTATION_RAD, errors_on, fit,
@@ -234,6 +234,7 @@ pub fn identify(
         geometry: trained.geometry,
         noise_floor_mm: noise_floor(repeats.as_ref(), &observed, &geometry),
         beyond_noise_mm: None,
+        beyond_noise_rad: None,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region,
         condition: mean_condition(dataset),
@@ -245,6 +246,9 @@ pub fn identify(
         BeyondNoise::of(&trained.geometry, geometry.parameters.len(), sensor, repeats.as_ref())
             .less_rounding(estimated.noise_floor_mm, sensor);
     estimated.beyond_noise_mm = beyond_noise.known_mm();
+    estimated.beyond_noise_rad = estimated
+        .beyond_noise_mm
+        .and_then(|mm| joint_errors_rad(&estimated, &geometry.frames.flange_from_target, mm));
     let benefit = variance_inflation.map(|variance_inflation| {
         benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
             .map(|benefit| benefit.with_unmodelled(beyond_noise))
@@ -259,6 +263,7 @@ pub fn identify(
         still: still_joints(&estimated.region),
         set_up_anew: set_up_anew(&observed.dataset, &geometry),
         unseen_target: unseen_target(&geometry, &observed.dataset, &estimated),
+        longer_tool: longer_tool_of(&estimated, benefit.as_ref()),
     };
     estimated.verdict = judge(&case, options);
     Ok(Identification {
@@ -646,6 +651,18 @@ struct VerdictInputs<'a> {
     set_up_anew: Option<String>,
     /// That the poses do not show the target's place on the flange.
     unseen_target: Option<String>,
+    /// What errors beyond the noise make of a tool that is longer than the target is far from the flange.
+    longer_tool: Option<String>,
+}
+
+/// Share of the expected error from which what is beyond the noise is stated for longer tools.
+const MOSTLY: f64 = 0.5;
+
+/// The sentence, where the expected error is mostly what the model does not contain.
+fn longer_tool_of(estimated: &Estimated, benefit: Option<&Result<Benefit, NoBenefit>>) -> Option<String> {
+    let beyond_mm = estimated.beyond_noise_mm?;
+    let expected_mm = benefit?.as_ref().ok()?.estimated_mm;
+    if beyond_mm > MOSTLY * expected_mm { longer_tool(estimated, beyond_mm) } else { None }
 }
 
 /// Range below which a joint hardly moved (°).
@@ -692,6 +709,9 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     }
     if let Some(unseen_target) = &case.unseen_target {
         verdict.note(unseen_target.as_str());
+    }
+    if let Some(longer_tool) = &case.longer_tool {
+        verdict.note(longer_tool.as_str());
     }
     if case.outliers.too_many > 0 {
         verdict.note(format!(

@@ -301,7 +301,7 @@ pub(crate) fn carried_through(
             Some(difference(&moved_by(-STEP)?, &moved_by(STEP)?) / (2.0 * STEP))
         })
         .collect::<Option<Vec<_>>>()?;
-    Some(RegisteredFrame { origin_mm: frame.translation.vector, twists })
+    Some(RegisteredFrame { origin_mm: frame.translation.vector, twists, beyond_share: 1.0 })
 }
 
 /// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A stationary

@@ -7,6 +7,7 @@ use crate::condition::payload::{is_load_dependent, payload_at};
 use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
 use crate::plan::MotionOutcome;
+use crate::risk::beyond_noise::ALIKE_RAD;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_programs::motion::load::Grip;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Origin, Place, Switch};
@@ -47,17 +48,37 @@ pub(crate) fn doubtful_effects_note(arms: &Arms<'_>) -> Option<String> {
         .then(|| format!("not certain, so counted in every σ but not corrected: {}", named.join(", ")))
 }
 
-/// How many times the largest σ an error beyond the noise is from which it is stated.
+/// How many times the largest σ an error beyond the noise is from which it is stated, where no σ counts it.
 const BEYOND_SIGMA: f64 = 2.0;
 
-/// What the measurement of the arm deviates from its model beyond the noise, where that is more than every σ of the program.
+/// Share of the largest σ from which an error that it counts is stated.
+const COUNTED_SHARE: f64 = 0.5;
+
+/// What the measurement of the arm deviates from its model beyond the noise: where a σ is mostly that, how it is counted; in a model of an
+/// earlier version, where it is more than every σ of the program.
 pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item = f64>) -> Option<String> {
     let largest = sigmas_mm.reduce(f64::max)?;
-    let beyond = arms.knowledge?.beyond_noise_mm.filter(|mm| *mm > BEYOND_SIGMA * largest)?;
-    Some(format!(
-        "the measurement deviates from this model by {beyond:.3} mm RMS more than noise explains: programs may be off by as much beyond every σ \
-         stated here; `truegrind diagnose` looks for the causes"
-    ))
+    let knowledge = arms.knowledge?;
+    let beyond = knowledge.beyond_noise_mm?;
+    if let Some(rad) = knowledge.beyond_noise_rad {
+        return (beyond > COUNTED_SHARE * largest).then(|| {
+            let (least, most) = rad.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), rad| (a.min(*rad), b.max(*rad)));
+            format!(
+                "every σ counts the {beyond:.3} mm RMS by which the measurement deviates from this model beyond noise, as errors of {:.4} to {:.4}° \
+                 in the joints (a longer tool is off by more) that are alike in poses less than {:.0}° apart; `truegrind diagnose` \
+                 looks for their causes",
+                least.to_degrees(),
+                most.to_degrees(),
+                ALIKE_RAD.to_degrees()
+            )
+        });
+    }
+    (beyond > BEYOND_SIGMA * largest).then(|| {
+        format!(
+            "the measurement deviates from this model by {beyond:.3} mm RMS more than noise explains: programs may be off by as much beyond every σ \
+             stated here; `truegrind diagnose` looks for the causes"
+        )
+    })
 }
 
 /// Lines and arcs that may start at several places.

@@ -12,6 +12,7 @@ use crate::condition::arm_conditions::ArmConditions;
 use crate::cut::{CutsOf, is_one_part};
 use crate::frames::frame_pair::ResolvedFrames;
 use crate::plan::reason::OutcomeReason;
+use crate::risk::beyond_noise::RegisteredErrors;
 use crate::risk::cut_risk::{self, CutRisk, Judgement, PartRegistration};
 use crate::risk::fixtures;
 use crate::risk::placement::{
@@ -234,11 +235,13 @@ impl Assessment {
         of_part: impl Fn(&u32) -> bool,
         first: usize,
     ) -> Part {
-        let AssessedObject { placement, registration, twists, .. } = found;
+        let AssessedObject { placement, registration, twists, errors, .. } = found;
+        let beyond_share = errors.as_ref().map_or(1.0, |errors| errors.share);
         let ResolvedFrames { real, carried, .. } = &list[first];
         let in_base = |carried: Option<&RegisteredFrame>| {
             let twists_of = twists.column_iter().map(|twist| twist.into_owned()).collect();
-            let of_path = RegisteredFrame { origin_mm: registration.centre.coords, twists: twists_of };
+            let of_path =
+                RegisteredFrame { origin_mm: registration.centre.coords, twists: twists_of, beyond_share };
             cut_risk::in_base(of_path, &real.object, carried)
         };
         self.registered.push((!real.holds_part).then(|| in_base(carried.as_ref())));
@@ -248,7 +251,7 @@ impl Assessment {
         let applied = placement.applied;
         self.placements.push(placement);
         let index = self.registered.len() - 1;
-        Part { index, applied, reference: real.object, registration, twists }
+        Part { index, applied, reference: real.object, registration, twists, errors }
     }
 
     /// Judges the cuts over the parts.
@@ -267,14 +270,15 @@ impl Assessment {
         let judge = |(motions, commanded): &(Vec<u32>, Vec<u32>)| {
             let targets: Vec<AssessedTarget> = commanded.iter().filter_map(|m| at(*m)).collect();
             let object = listing.motions[motions[0] as usize].work_object?;
-            let Part { index, applied, reference, registration, twists } =
+            let Part { index, applied, reference, registration, twists, errors } =
                 parts.get(&chosen.part_of[object as usize]).filter(|_| !targets.is_empty())?;
             let off = PathDeviation::of_part(&targets, reference, list, conditions, knowledge);
-            let part = PartRegistration { registration, twists };
+            let part = PartRegistration { registration, twists, errors: errors.as_ref() };
             let judgement = cut_risk::assess_cut(&off, &part, knowledge, *applied);
             let weight = motions.len() as f64 / targets.len() as f64;
             let points = targets.len();
-            let harm = probability_of_harm(judgement.square, &judgement.toward, posterior, points);
+            let harm =
+                probability_of_harm(judgement.square, &judgement.toward, judgement.beyond, posterior, points);
             Some((JudgedCut { placement: *applied, part: *index, points, weight }, judgement, harm))
         };
         let judged: Vec<Option<(JudgedCut, Judgement, f64)>> = chosen.cuts.par_iter().map(judge).collect();
@@ -311,6 +315,7 @@ impl Assessment {
             points: judged.weight * judged.points as f64,
             square: judged.weight * judgement.square,
             toward: judgement.toward * judged.weight,
+            beyond: judgement.beyond.sqrt() * judged.weight,
         });
     }
 }
@@ -336,14 +341,18 @@ struct Part {
     registration: Registration,
     /// Twists of the registration per unit of each parameter.
     twists: Matrix6xX<f64>,
+    /// How the registration follows the errors beyond the noise.
+    errors: Option<RegisteredErrors>,
 }
 
-/// Contribution of a cut: points, |d|² (mm²), and Jᵀ d.
+/// Contribution of a cut: points, |d|² (mm²), Jᵀ d, and the standard deviation of d·e by the errors beyond the noise (mm²), which are
+/// taken as alike in all cuts: never less than they are.
 #[derive(Debug, Clone)]
 struct CutContribution {
     points: f64,
     square: f64,
     toward: DVector<f64>,
+    beyond: f64,
 }
 
 /// Sum over cuts.
@@ -351,17 +360,19 @@ struct ProgramTotal(CutContribution);
 
 impl ProgramTotal {
     fn new(parameters: usize) -> Self {
-        Self(CutContribution { points: 0.0, square: 0.0, toward: DVector::zeros(parameters) })
+        Self(CutContribution { points: 0.0, square: 0.0, toward: DVector::zeros(parameters), beyond: 0.0 })
     }
 
     fn add(&mut self, cut: &CutContribution) {
         self.0.points += cut.points;
         self.0.square += cut.square;
         self.0.toward += &cut.toward;
+        self.0.beyond += cut.beyond;
     }
 
     fn probability_of_harm(&self, posterior: &[PosteriorComponent]) -> Option<f64> {
-        let CutContribution { points, square, toward } = &self.0;
-        (*points > 0.0).then(|| probability_of_harm(*square, toward, posterior, points.round() as usize))
+        let CutContribution { points, square, toward, beyond } = &self.0;
+        let count = points.round() as usize;
+        (*points > 0.0).then(|| probability_of_harm(*square, toward, beyond * beyond, posterior, count))
     }
 }

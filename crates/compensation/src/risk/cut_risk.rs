@@ -5,6 +5,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6xX, Vector3, Vector6};
 
+use crate::risk::beyond_noise::{CutErrors, RegisteredErrors};
 use crate::risk::placement::{PathDeviation, Placement};
 use crate::risk::registration::Registration;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
@@ -42,6 +43,8 @@ pub(crate) struct Judgement {
     /// |d|² (mm²), and Jᵀ d: summed over cuts they assess the program.
     pub(crate) square: f64,
     pub(crate) toward: DVector<f64>,
+    /// Variance of d·e by the errors e beyond the noise (mm⁴).
+    pub(crate) beyond: f64,
 }
 
 /// Most points by which a cut is assessed.
@@ -52,6 +55,8 @@ pub(crate) struct PartRegistration<'r> {
     pub(crate) registration: &'r Registration,
     /// Its twists per unit of each parameter.
     pub(crate) twists: &'r Matrix6xX<f64>,
+    /// How it follows the errors beyond the noise.
+    pub(crate) errors: Option<&'r RegisteredErrors>,
 }
 
 /// Assesses the points of a cut on a part, whose work object is displaced already where its shape alone is corrected.
@@ -70,10 +75,14 @@ pub(crate) fn assess_cut(
             *velocity = (Vector3::from(*velocity) - part.registration.shift_at(&twist, point)).into();
         }
     }
-    let of_shape = total_variance(&shape_jacobian, &knowledge.covariance);
-    let (jacobian, variance) = match placement {
-        Placement::Shape => (&shape_jacobian, of_shape),
-        _ => (&off.jacobian, total_variance(&off.jacobian, &knowledge.covariance)),
+    let errors = CutErrors::of(&off.errors, &off.intended, &off.shifts, part.registration, part.errors);
+    let of_shape = total_variance(&shape_jacobian, &knowledge.covariance) + errors.shape_square_mm2;
+    let (jacobian, variance, beyond) = match placement {
+        Placement::Shape => (&shape_jacobian, of_shape, errors.shape_along_mm4),
+        _ => {
+            let variance = total_variance(&off.jacobian, &knowledge.covariance) + errors.square_mm2;
+            (&off.jacobian, variance, errors.along_mm4)
+        }
     };
     let square = off.shifts.iter().map(Vector3::norm_squared).sum();
     let toward = |column: &[f64]| -> f64 {
@@ -89,6 +98,7 @@ pub(crate) fn assess_cut(
         shape_sigma_mm: rms(of_shape),
         square,
         toward,
+        beyond,
     }
 }
 

@@ -11,9 +11,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::condition::arm_conditions::ArmConditions;
 use crate::frames::frame_pair::ResolvedFrames;
+use crate::risk::beyond_noise::{ErrorAt, RegisteredErrors};
 use crate::risk::probability::probability_of_harm;
 use crate::risk::registration::Registration;
 use crate::risk::remedy::Remedy;
+use truegrind_arm::estimated::beyond_noise::slopes;
 use truegrind_arm::estimated::{Estimated, FlangePoint, PosteriorComponent, RegisteredFrame};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
@@ -91,6 +93,8 @@ pub(crate) struct PathDeviation {
     pub(crate) shifts: Vec<Vector3<f64>>,
     /// Derivatives of the positions, one below the other (3 n × p), relative to the taught frame where there is one.
     pub(crate) jacobian: DMatrix<f64>,
+    /// Errors beyond the noise of the model; empty where none are known.
+    pub(crate) errors: Vec<ErrorAt>,
 }
 
 impl PathDeviation {
@@ -105,7 +109,9 @@ impl PathDeviation {
             intended: targets.iter().map(|target| target.intended.translation.vector.into()).collect(),
             shifts: Vec::with_capacity(targets.len()),
             jacobian: DMatrix::zeros(3 * targets.len(), knowledge.order.len()),
+            errors: Vec::new(),
         };
+        let beyond_rad = knowledge.beyond_noise_rad.filter(|rad| rad.iter().any(|rad| *rad > 0.0));
         let mut into_object: Vec<Matrix3<f64>> = Vec::with_capacity(targets.len());
         for run in targets.chunk_by(|a, b| a.condition_index == b.condition_index) {
             let arm = conditions.arm(run[0].condition_index);
@@ -125,6 +131,12 @@ impl PathDeviation {
                 });
             }
             let in_base = knowledge.position_jacobians(arm, &points);
+            out.errors.extend(beyond_rad.iter().flat_map(|rad| {
+                points.iter().map(|point| {
+                    let slopes = slopes(arm, &point.joints, &point.flange_from_tool);
+                    ErrorAt { joints: point.joints, shifts: std::array::from_fn(|j| slopes[j] * rad[j]) }
+                })
+            }));
             out.jacobian.rows_mut(3 * first, 3 * run.len()).copy_from(&in_base);
         }
         out.turn_velocities(&into_object);
@@ -158,12 +170,15 @@ impl PathDeviation {
         out
     }
 
-    /// Turns the derivatives of each point.
+    /// Turns the derivatives and the errors of each point.
     fn turn_velocities(&mut self, turns: &[Matrix3<f64>]) {
         for mut column in self.jacobian.column_iter_mut() {
             for (turn, velocity) in turns.iter().zip(column.as_mut_slice().as_chunks_mut().0) {
                 *velocity = (turn * Vector3::from(*velocity)).into();
             }
+        }
+        for (turn, error) in turns.iter().zip(&mut self.errors) {
+            error.shifts = error.shifts.map(|shift| turn * shift);
         }
     }
 }
@@ -204,6 +219,8 @@ pub(crate) struct AssessedObject {
     pub(crate) registration: Registration,
     /// The twists of the registration per unit of each parameter.
     pub(crate) twists: Matrix6xX<f64>,
+    /// How it follows the errors beyond the noise; absent without any.
+    pub(crate) errors: Option<RegisteredErrors>,
 }
 
 /// The path over one work object, from sampled targets.
@@ -225,11 +242,15 @@ pub(crate) fn assess_placement(
     let squares = (0..count).map(|k| registration.shift(&twist, k).norm_squared());
     let deviation_mm = (squares.sum::<f64>() / count as f64).sqrt();
     let twists = registration.twists(&off.jacobian);
-    let covariance: Matrix6<f64> = &twists * &knowledge.covariance * twists.transpose();
+    let errors = RegisteredErrors::of(&registration, &off.intended, &off.errors);
+    let of_errors = errors.as_ref().map_or_else(Matrix6::zeros, |errors| errors.covariance);
+    let covariance: Matrix6<f64> = &twists * &knowledge.covariance * twists.transpose() + of_errors;
     let sigma_mm = registration.mean_square(&covariance).max(0.0).sqrt();
-    let toward = twists.tr_mul(&registration.weighed(&twist));
+    let weighed = registration.weighed(&twist);
+    let toward = twists.tr_mul(&weighed);
+    let along = weighed.dot(&(of_errors * weighed));
     let square = deviation_mm * deviation_mm * count as f64;
-    let probability_of_harm = probability_of_harm(square, &toward, posterior, count);
+    let probability_of_harm = probability_of_harm(square, &toward, along, posterior, count);
     let unlocated = targets.iter().any(|target| list[target.frames_index].unlocated);
     let accepted =
         !unlocated && accepts_position(deviation_mm, sigma_mm, probability_of_harm, choice.max_risk);
@@ -252,7 +273,7 @@ pub(crate) fn assess_placement(
     };
     let stays = applied == Placement::Absolute || !deviation_mm.is_finite();
     let displacement = (!stays).then(|| displacement(&registration, &off, twist));
-    Some(AssessedObject { placement, displacement, registration, twists })
+    Some(AssessedObject { placement, displacement, registration, twists, errors })
 }
 
 /// The rigid motion that best maps the intended points to the reached ones: the linear solution, refined twice.

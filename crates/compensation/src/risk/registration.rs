@@ -50,6 +50,22 @@ impl Registration {
         Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
     }
 
+    /// The same where point `k` alone is displaced.
+    pub(crate) fn twist_of(&self, k: usize, shift: &Vector3<f64>) -> Vector6<f64> {
+        let (v, w) = (shift / self.levers.len() as f64, self.turning * self.levers[k].cross(shift));
+        Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
+    }
+
+    /// Σ Wᵀ d over any points that are displaced by d, where W maps a twist to a point's displacement (mm², mm³).
+    pub(crate) fn turned(&self, points: &[Point3<f64>], shifts: &[Vector3<f64>]) -> Vector6<f64> {
+        let (mut v, mut w) = (Vector3::zeros(), Vector3::zeros());
+        for (point, shift) in points.iter().zip(shifts) {
+            v += shift;
+            w += (point - self.centre).cross(shift);
+        }
+        Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
+    }
+
     /// Displacement of point `k` by a twist about the centroid (mm).
     pub(crate) fn shift(&self, twist: &Vector6<f64>, k: usize) -> Vector3<f64> {
         twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&self.levers[k])

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use crate::condition::arm_conditions::ArmConditions;
 use crate::frames::frame_pair::{ResolvedFrames, carried_through};
 use crate::frames::taught::taught_frame;
+use crate::risk::beyond_noise::RegisteredErrors;
 use crate::risk::measurement_information::{FREE, PriorSigma, Readings, SensorPosition, factor, updated};
 use crate::risk::placement::{AssessedTarget, PathDeviation, accepts_position, evenly_spaced};
 use crate::risk::registration::Registration;
@@ -148,6 +149,8 @@ struct CurrentKnowledge {
     /// Over all points: gᵀ W h is the sum of the scalar products of the displacements by two twists.
     weights: Matrix6<f64>,
     covariance: Matrix6<f64>,
+    /// What the errors beyond the noise make of it, which no measurement of parameters lessens.
+    beyond: Matrix6<f64>,
     factor: DMatrix<f64>,
 }
 
@@ -163,8 +166,10 @@ impl CurrentKnowledge {
         }
         let factor = factor(&placement.knowledge.covariance)?;
         let part = &twists * &factor;
-        let covariance = Matrix6::from_iterator((&part * part.transpose()).iter().copied());
-        Some(Self { registration, off, twist, twists, weights, covariance, factor })
+        let errors = RegisteredErrors::of(&registration, &off.intended, &off.errors);
+        let beyond = errors.map_or_else(Matrix6::zeros, |errors| errors.covariance);
+        let covariance = Matrix6::from_iterator((&part * part.transpose()).iter().copied()) + beyond;
+        Some(Self { registration, off, twist, twists, weights, covariance, beyond, factor })
     }
 
     /// Knowledge after `measurements`.
@@ -179,7 +184,7 @@ impl CurrentKnowledge {
         let touching = touching.filter(|_| measurements.contains(&Measurement::Touch));
         let twists = touching.map_or(&self.twists, |touching| &touching.twists);
         let left = updated(&self.factor, &information, twists)?;
-        let mut left = Matrix6::from_iterator(left.iter().copied());
+        let mut left = Matrix6::from_iterator(left.iter().copied()) + self.beyond;
         if let Some(touching) = touching {
             left += touching.adds;
         }

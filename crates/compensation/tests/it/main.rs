@@ -12,6 +12,7 @@ mod circles;
 mod payload;
 mod placement;
 mod backlash;
+mod beyond_noise;
 mod joint_limits;
 mod reasons;
 mod remedy;
@@ -81,6 +82,7 @@ fn estimated(model: Model, joints: &[Joints]) -> Estimated {
         geometry: zero,
         noise_floor_mm: None,
         beyond_noise_mm: None,
+        beyond_noise_rad: None,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region::of(joints, 1.0),
         condition: Condition::default(),
@@ -429,6 +431,7 @@ fn the_quick_sigma_equals_the_covariance() {
     let mut frame = || RegisteredFrame {
         origin_mm: Vector3::new(400.0, 20.0, 100.0),
         twists: (0..n).map(|_| Vector6::from_fn(|_, _| random.random_range(-1.0..1.0))).collect(),
+        beyond_share: 0.3,
     };
     let frames = [frame(), frame()];
     let chosen = |k: usize| [None, Some(frames[0].carried()), Some(frames[1].carried())][k % 3];

@@ -49,7 +49,7 @@ fn with(placement: Placement) -> Options {
 }
 
 /// The part of displacements that a rigid motion of the points explains.
-fn rigid(points: &[Vector3<f64>]) -> DMatrix<f64> {
+pub(super) fn rigid(points: &[Vector3<f64>]) -> DMatrix<f64> {
     let centre = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let mut motions = DMatrix::zeros(3 * points.len(), 6);
     for (k, p) in points.iter().enumerate() {

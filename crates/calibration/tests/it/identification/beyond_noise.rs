@@ -1,13 +1,21 @@
 //! What a model leaves beyond the noise, as far as it is known.
 
-use rand::SeedableRng;
+use nalgebra::{Point3, Vector3};
+use rand::{RngExt as _, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::unseen_target::{arm, start, tracker};
+use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::StageErrors;
+use truegrind_arm::estimated::beyond_noise::ErringArm;
+use truegrind_arm::model::Joints;
 use truegrind_calibration::identification::beyond_noise::BeyondNoise;
-use truegrind_calibration::measurement::dataset::Sensor;
+use truegrind_calibration::identification::identify::{Options, identify};
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::noise_floor::NoiseFloor;
+use truegrind_calibration::measurement::split;
+use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 
 /// Errors of this size (mm).
@@ -88,4 +96,53 @@ fn an_excess_over_the_noise_is_expected_though_it_is_not_significant() {
     let ratios: Vec<f64> = (0..200).map(|_| stated(0.0, &mut rng)).collect();
     let mean_square = ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / 200.0;
     assert!(mean_square < 0.15, "{mean_square}");
+}
+
+/// 120 poses of an arm each of whose joints errs by `rad` in a way of its own at each pose, a fifth of them measured twice. The target
+/// is on the axis of joint 6, `target_mm` in front of the flange.
+fn erring(rad: &[f64; 6], target_mm: f64, seed: u64) -> Dataset {
+    let (actual, still) = (arm(), Condition::default());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let poses: Vec<(Joints, Joints)> = (0..120)
+        .map(|_| {
+            let q = Joints::from_fn(|_, _| rng.random_range(-1.0..1.0));
+            let error = Joints::from_fn(|j, _| {
+                let v: f64 = StandardNormal.sample(&mut rng);
+                rad[j] * v
+            });
+            (q, q + error)
+        })
+        .collect();
+    let rows = poses.iter().chain(poses.iter().step_by(5)).enumerate().map(|(i, (logged, real))| {
+        let seen = tracker().inverse() * (actual.forward(real, &still) * Point3::new(0.0, 0.0, target_mm));
+        let noise = Vector3::from_fn(|_, _| {
+            let v: f64 = StandardNormal.sample(&mut rng);
+            0.01 * v
+        });
+        Row::new(i, *logged, Reading::Position(seen.coords + noise))
+    });
+    Dataset::new("joints.csv", Sensor::Position, rows.collect::<Vec<_>>())
+}
+
+/// On the axis of joint 6 the target does not see that joint err, and the others less than a tool does.
+#[test]
+fn what_the_target_saw_is_stated_for_a_longer_tool() {
+    // Smaller gears err by more.
+    const RAD: [f64; 6] = [1e-4, 1e-4, 1e-4, 2e-4, 3e-4, 3e-4];
+    let halves = |rows: &Dataset| split::random(rows, 0.2, 0);
+    for (seed, target_mm, is_told) in [(1, 20.0, true), (2, 20.0, true), (3, 400.0, false)] {
+        let dataset = erring(&RAD, target_mm, seed);
+        let found =
+            identify(&dataset, "arm", &arm(), &start(&dataset), &halves, &Options::default()).unwrap();
+        let estimated = &found.estimated;
+        let samples_deg = &estimated.region.samples_deg;
+        let erring = ErringArm { model: &estimated.model, condition: &estimated.condition, samples_deg };
+        // A long tool beside the axis.
+        let tool = Pose::translation(300.0, 0.0, 100.0);
+        let stated = erring.displacement_mm(&tool, &estimated.beyond_noise_rad.unwrap());
+        let ratio = erring.displacement_mm(&tool, &RAD) / stated;
+        assert!((1.0 / 1.3..1.3).contains(&ratio), "seed {seed}: true over stated {ratio}");
+        let told = estimated.verdict.reasons.iter().any(|reason| reason.contains("tool tip 300 mm in front"));
+        assert_eq!(told, is_told, "seed {seed}: {:?}", estimated.verdict.reasons);
+    }
 }
