@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
+use crate::nc::orientation::Angles;
+use nalgebra::UnitQuaternion;
 pub use reason::{OpaqueReason, Reason};
 use smallvec::SmallVec;
 pub use target::{FARTHEST_MM, Frame, JointTarget, RobTarget, TargetValue};
@@ -288,6 +290,26 @@ impl Modal {
     };
 }
 
+/// Three words of orientation that run linearly, each on its own, as rotary axes do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisTurn {
+    /// Their convention.
+    pub convention: Angles,
+    /// The words in effect at the start (°), whole turns included.
+    pub from_deg: [f64; 3],
+    /// Those at the end.
+    pub to_deg: [f64; 3],
+}
+
+impl AxisTurn {
+    /// The orientation at a share of the path.
+    pub fn at(&self, share: f64) -> UnitQuaternion<f64> {
+        self.convention.rotation(std::array::from_fn(|axis| {
+            self.from_deg[axis] + share * (self.to_deg[axis] - self.from_deg[axis])
+        }))
+    }
+}
+
 /// One motion instruction. More than twenty fields: whatever a motion of any language states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
@@ -324,6 +346,9 @@ pub struct Motion {
     pub axis: Option<Box<[f64; 3]>>,
     /// Whether a circular motion is programmed by its radius, so that the centre is ill-conditioned near half a turn.
     pub by_radius: bool,
+    /// How the tool turns where the control may run A, B and C each on its own and that is another way than one rotation
+    /// about one axis; elsewhere `None`.
+    pub axis_turn: Option<Box<AxisTurn>>,
     /// The modal state.
     pub modal: Modal,
     /// Whether it is in a loop.
@@ -364,6 +389,7 @@ impl Motion {
             rapid: false,
             axis: None,
             by_radius: false,
+            axis_turn: None,
             modal,
             in_loop: false,
             conditional: false,
