@@ -91,8 +91,6 @@ fn the_stated_deviation_of_a_line_counts_words_that_run_linearly() {
         // Once around: the shortest rotation is none.
         "G0 X-20 Y-40 Z-80 A180 B10 C0\nG1 Z-100 F800\nG1 X10 C360 F800\n",
         "G0 X-20 Y-40 Z-80 A180 B10 C180\nG1 Z-100 F800\nG1 Y10 C-180 F800\n",
-        // Four times around.
-        "G0 X-20 Y-40 Z-80 A180 B10 C0\nG1 Z-100 F800\nG1 X10 C1440 F800\n",
     ] {
         let (planned, text) = planned(body, &actual, Dialect::LinuxCnc);
         let (intended, commanded) = (words(&format!("{HEAD}{body}")), words(&text));
@@ -116,4 +114,18 @@ fn an_arc_counts_words_that_run_linearly_too() {
     };
     let (still, around) = (stated(""), stated(" C360"));
     assert!(around > still + 0.1, "{still} {around}");
+}
+
+/// Whole turns of which a quarter is whole too.
+#[test]
+fn four_turns_are_no_turn_about_one_axis() {
+    for (turn, is_seen) in
+        [("C1440", true), ("C3600", true), ("C0", false), ("C30", false), ("A179 C30", true)]
+    {
+        let source = format!("{HEAD}G1 X0 Y0 Z0 A180 B0 C0 F800\nX10 {turn}\n");
+        let setup = Setup { dialect: Some(Dialect::LinuxCnc), ..Setup::default() };
+        let listing = Task::read(&[("p.ngc", source.as_bytes())], &setup).listing;
+        let motion = &listing.motions[1];
+        assert_eq!((motion.axis_turn.is_some(), motion.insertable), (is_seen, !is_seen), "{turn}");
+    }
 }
