@@ -136,11 +136,12 @@ impl<'s> Program<'s> {
         };
         let shown = |text: &str| if text.is_empty() { "nothing".to_owned() } else { format!("`{text}`") };
         let words = |found: TextDifference| {
-            let TextDifference { file, line, here, original } = found;
+            let TextDifference { file, line, here, original, in_motion } = found;
             let name = corrected.names.get(file).filter(|_| corrected.names.len() > 1);
             let place = name.map_or_else(|| format!("line {line}"), |name| format!("{name} line {line}"));
             let [here, original] = [shown(&here), shown(&original)];
-            format!("{place}: {here} here, {original} in the original, outside any motion")
+            let what = if in_motion { "in more than its target" } else { "outside any motion" };
+            format!("{place}: {here} here, {original} in the original, {what}")
         };
         corrected.text_differences(original).unwrap_or_default().into_iter().map(words).collect()
     }
