@@ -361,12 +361,9 @@ impl Interpreter<'_, '_> {
         }
         known_value &= !self.state.work_offset.assigned.is_rotary(name);
         match block.radius.map(|index| self.number(&block.words[index])) {
-            // The rotation of the work frame about z (LinuxCNC).
-            Some(Some(angle)) => {
-                let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle.to_radians());
-                frame.quaternion = [rotation.w, rotation.i, rotation.j, rotation.k];
-            }
-            Some(None) => known_value = false,
+            // A rotation about z (LinuxCNC): it turns X and Y, but not A, B and C, so that no frame describes it.
+            Some(Some(0.0)) => frame.quaternion = Frame::IDENTITY.quaternion,
+            Some(_) => known_value = false,
             None => {}
         }
         self.assign_offset(name, known_value.then_some(frame));

@@ -526,3 +526,16 @@ fn harmless_names_are_listed_with_their_uses() {
         assert!(!certain(block), "{block}");
     }
 }
+
+/// LinuxCNC turns X and Y by the R of an offset, and leaves A, B and C alone: no frame of tool poses does that.
+#[test]
+fn a_rotation_of_the_offset_does_not_turn_the_tool() {
+    for dialect in [LinuxCnc, Iso] {
+        for turn in ["R30", "R-90", "R[#5]", "R0.001"] {
+            check(dialect, &[(&format!("G10 L2 P1 X510 Y0 Z0 {turn}\n{G}"), &[left(WorkObjectAssigned)])]);
+        }
+        check(dialect, &[(&format!("G10 L2 P1 X510 Y0 Z0 R30\nG10 L2 P1 X510 Y0 Z0 R0\n{G}"), &[None])]);
+        let kept = format!("G10 L2 P1 X510 Y0 Z0 R30\nG10 L2 P1 X510 Y0 Z0\n{G}");
+        check(dialect, &[(&kept, &[left(WorkObjectAssigned)])]);
+    }
+}
