@@ -655,7 +655,13 @@ impl Listing {
     /// assigned may be any, and a block whose modal state is unknown has none.
     pub fn may_share_frames(&self, a: &Motion, b: &Motion) -> bool {
         let may_be_any = |reason: Option<Reason>| match reason {
-            Some(Reason::Assigned | Reason::HandedOver | Reason::Parameter | Reason::UnknownFlow) => true,
+            Some(
+                Reason::Assigned
+                | Reason::AfterProbing
+                | Reason::HandedOver
+                | Reason::Parameter
+                | Reason::UnknownFlow,
+            ) => true,
             // Frames of NC programs have numbers, and are stated elsewhere.
             Some(_) => !self.numbered,
             None => false,
@@ -678,7 +684,9 @@ impl Listing {
         let tool = match self.tool(motion).map(|tool| &tool.value) {
             Some(Ok(tool)) => tool,
             Some(Err(Reason::Assigned)) => return Some(Reason::ToolAssigned),
-            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange))) => return Some(*reason),
+            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange | Reason::AfterProbing))) => {
+                return Some(*reason);
+            }
             Some(Err(Reason::HandedOver)) => return Some(Reason::ToolHandedOver),
             Some(Err(Reason::Parameter)) => return Some(Reason::ToolParameter),
             Some(Err(_)) => return Some(Reason::ToolUnknown),
@@ -689,7 +697,9 @@ impl Listing {
             Some(Ok(work_object)) if work_object.robhold == tool.robhold => Some(Reason::HeldByBoth),
             Some(Ok(_)) => None,
             Some(Err(Reason::Assigned)) => Some(Reason::WorkObjectAssigned),
-            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange))) => Some(*reason),
+            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange | Reason::AfterProbing))) => {
+                Some(*reason)
+            }
             Some(Err(Reason::HandedOver)) => Some(Reason::WorkObjectHandedOver),
             Some(Err(Reason::Parameter)) => Some(Reason::WorkObjectParameter),
             _ => Some(Reason::WorkObjectUnknown),

@@ -63,6 +63,7 @@ reasons! {
         WorkObjectHandedOver => "the work object is passed to a routine outside the given files, which may change it",
         ToolParameter => "the tool is a parameter of the routine: its value comes from the caller",
         WorkObjectParameter => "the work object is a parameter of the routine: its value comes from the caller",
+        AfterProbing => "a probing or measuring cycle before it (TCH PROBE, CYCLE97x, G37) may have changed the work offset, its rotation or the tool; run that cycle in a program of its own and state what it sets",
         HeldByBoth => "exactly one of tool and work object must be held by the robot",
         ExternalOnly => "moves only external axes",
         NoTarget => "moves the robot or an axis without a target in the program",

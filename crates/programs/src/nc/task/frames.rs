@@ -397,7 +397,7 @@ impl Interpreter<'_, '_> {
             // One of its lengths has not been set yet.
             Some(Some(frame)) if frame.position_mm.iter().any(|mm| mm.is_nan()) => Err(Reason::ToolUnknown),
             Some(Some(frame)) => Ok(frame),
-            Some(None) => Err(Reason::Assigned),
+            Some(None) => Err(self.state.tool.assigned.reason()),
             None => self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown),
         }
     }
@@ -406,7 +406,7 @@ impl Interpreter<'_, '_> {
     pub(super) fn frame_value(&self, name: &str) -> Result<Frame, Reason> {
         match self.state.work_offset.assigned.get(name) {
             Some(Some(frame)) => Ok(frame),
-            Some(None) => Err(Reason::Assigned),
+            Some(None) => Err(self.state.work_offset.assigned.reason()),
             // Without a settable offset Siemens uses the basic frame.
             None => self
                 .frames

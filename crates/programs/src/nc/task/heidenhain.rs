@@ -135,7 +135,11 @@ impl<'s> Interpreter<'_, 's> {
             }
             b"TCH" => {
                 self.list_left(block, "TCH PROBE", Reason::Probe);
-                self.invalidate_position();
+                let number = words.get(2).copied().unwrap_or_default();
+                match measures_only(number) {
+                    true => self.invalidate_position(),
+                    false => self.invalidate_by_probing(),
+                }
             }
             b"BEGIN" | b"END" => {
                 if words.contains(&&b"INCH"[..]) {
@@ -461,6 +465,13 @@ impl<'s> Interpreter<'_, 's> {
             self.state.variables.invalidate(Reason::UnknownVariable);
         }
     }
+}
+
+/// Whether a TCH PROBE cycle certainly sets neither presets nor tools: REF. PLANE, POLAR PRESET, MEASURING, MEASURING IN 3-D, MEASURE ANGLE,
+/// MEASURE PLANE, FAST PROBING. Lines of a definition (`31.1`) have the number of their cycle.
+fn measures_only(number: &[u8]) -> bool {
+    let whole = number.split(|byte| *byte == b'.').next().unwrap_or_default();
+    matches!(whole, b"0" | b"1" | b"3" | b"4" | b"420" | b"431" | b"441")
 }
 
 /// Cycles of one and two digits that a definition only prepares.

@@ -539,3 +539,45 @@ fn a_rotation_of_the_offset_does_not_turn_the_tool() {
         check(dialect, &[(&kept, &[left(WorkObjectAssigned)])]);
     }
 }
+
+/// Cycles of the control that measure can write what they measured into work offsets, rotations and tools, of which the text shows nothing.
+#[test]
+fn behind_a_measuring_cycle_frame_and_tool_are_unknown() {
+    let (probe, after) = (left(Probe), left(AfterProbing));
+    let l = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
+    let preset = "CYCL DEF 247 DATUM SETTING Q339=1";
+    for number in [
+        "404 SET BASIC ROTATION",
+        "400",
+        "405",
+        "410",
+        "419",
+        "425",
+        "451",
+        "481",
+        "1410",
+        "2.0",
+        "31.0",
+        "463",
+    ] {
+        check(Heidenhain, &[(&format!("TCH PROBE {number}\n{l}"), &[probe, after])]);
+        // Selecting the tool again does not help: its line of the table may be another.
+        check(Heidenhain, &[(&format!("TCH PROBE {number}\nTOOL CALL 1 Z S5\n{l}"), &[probe, after])]);
+    }
+    for number in ["0.0", "1.0", "3.0", "420 MEASURE ANGLE", "431", "441"] {
+        check(Heidenhain, &[(&format!("TCH PROBE {number}\n{l}"), &[probe, None])]);
+    }
+    assert_eq!(reasons(Heidenhain, &format!("TCH PROBE 410\n{preset}\n{l}"))[0], probe);
+    assert_ne!(reasons(Heidenhain, &format!("TCH PROBE 410\n{preset}\n{l}"))[1], None);
+    for cycle in
+        ["CYCLE977(101,1)", "CYCLE961(1)", "CYCLE998(105)", "CYCLE982(1,1)", "CYCLE996", "CYCLE9960(1)"]
+    {
+        check(Siemens, &[(&format!("{cycle}\n{S}\nG54\n{S}"), &[probe, after, after])]);
+        let assigned = format!("{cycle}\n$P_UIFR[1]=CTRANS(X,400)\nG54\n{S}");
+        check(Siemens, &[(&assigned, &[probe, after])]);
+    }
+    check(Siemens, &[(&format!("MCALL CYCLE977(101)\n{S}\nMCALL\n{S}"), &[probe, left(Cycle), after])]);
+    // Those that turn or mill set nothing.
+    check(Siemens, &[(&format!("CYCLE952(1)\n{S}"), &[left(Cycle), None])]);
+    check(Fanuc, &[(&format!("G37 Z50.\n{F}"), &[probe, after])]);
+}
