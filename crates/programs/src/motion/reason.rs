@@ -90,6 +90,7 @@ reasons! {
         NoTcpMode => "no tool centre point control (G43.4, TRAORI, M128): X Y Z are not the tool tip",
         Transformed => "coordinates are rotated, scaled, mirrored, polar or in a tilted plane",
         RadiusCompensation => "tool radius compensation is active (G41, G42)",
+        ReferencePoint => "FUNCTION TCPM with another reference point than TIP-TIP: X Y Z are not the tool tip; state REFPNT TIP-TIP, and points of the tip",
         TurnAlone => "turns the tool only: its feed is in °/min, and adding X, Y, Z would make it mm/min",
         AlignedToNormal => "the control aligns the tool with the surface normal (LN without a tool vector under M128)",
         MachineCoordinates => "in machine coordinates (G53, SUPA, M91)",

@@ -614,6 +614,8 @@ impl Interpreter<'_, '_> {
             Some(reason)
         } else if state.groups.active_transforms() != 0 {
             Some(Reason::Transformed)
+        } else if state.groups.is_on(ModalGroup::ReferencePoint) {
+            Some(Reason::ReferencePoint)
         } else if block.flags.other_axes && self.has_incremental_uvw() {
             Some(Reason::UnknownWord)
         } else if self.dialect == Dialect::Heidenhain

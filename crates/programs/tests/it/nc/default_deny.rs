@@ -581,3 +581,22 @@ fn behind_a_measuring_cycle_frame_and_tool_are_unknown() {
     check(Siemens, &[(&format!("CYCLE952(1)\n{S}"), &[left(Cycle), None])]);
     check(Fanuc, &[(&format!("G37 Z50.\n{F}"), &[probe, after])]);
 }
+
+#[test]
+fn points_of_the_tool_other_than_its_tip_are_not_corrected() {
+    let point = left(ReferencePoint);
+    let l = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
+    let tcpm = |point: &str| format!("FUNCTION TCPM F TCP AXIS SPAT PATHCTRL VECTOR{point}\n{l}\nL X+6");
+    for (stated, expected) in [
+        ("", None),
+        (" REFPNT TIP-TIP", None),
+        (" REFPNT TIP-CENTER", point),
+        (" REFPNT CENTER-CENTER", point),
+    ] {
+        check(Heidenhain, &[(&tcpm(stated), &[expected, expected])]);
+    }
+    let back = format!("{}\n{}", tcpm(" REFPNT CENTER-CENTER"), tcpm(" REFPNT TIP-TIP"));
+    check(Heidenhain, &[(&back, &[point, point, None, None])]);
+    let reset = format!("{}\nFUNCTION RESET TCPM\nM128\n{l}", tcpm(" REFPNT TIP-CENTER"));
+    check(Heidenhain, &[(&reset, &[point, point, None])]);
+}
