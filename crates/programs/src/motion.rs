@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
+use crate::nc::orientation::Angles;
+use nalgebra::UnitQuaternion;
 pub use reason::{OpaqueReason, Reason};
 use smallvec::SmallVec;
 pub use target::{FARTHEST_MM, Frame, JointTarget, RobTarget, TargetValue};
@@ -288,6 +290,26 @@ impl Modal {
     };
 }
 
+/// Three words of orientation that run linearly, each on its own, as rotary axes do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisTurn {
+    /// Their convention.
+    pub convention: Angles,
+    /// The words in effect at the start (°), whole turns included.
+    pub from_deg: [f64; 3],
+    /// Those at the end.
+    pub to_deg: [f64; 3],
+}
+
+impl AxisTurn {
+    /// The orientation at a share of the path.
+    pub fn at(&self, share: f64) -> UnitQuaternion<f64> {
+        self.convention.rotation(std::array::from_fn(|axis| {
+            self.from_deg[axis] + share * (self.to_deg[axis] - self.from_deg[axis])
+        }))
+    }
+}
+
 /// One motion instruction. More than twenty fields: whatever a motion of any language states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
@@ -324,6 +346,9 @@ pub struct Motion {
     pub axis: Option<Box<[f64; 3]>>,
     /// Whether a circular motion is programmed by its radius, so that the centre is ill-conditioned near half a turn.
     pub by_radius: bool,
+    /// How the tool turns where the control may run A, B and C each on its own and that is another way than one rotation
+    /// about one axis; elsewhere `None`.
+    pub axis_turn: Option<Box<AxisTurn>>,
     /// The modal state.
     pub modal: Modal,
     /// Whether it is in a loop.
@@ -364,6 +389,7 @@ impl Motion {
             rapid: false,
             axis: None,
             by_radius: false,
+            axis_turn: None,
             modal,
             in_loop: false,
             conditional: false,
@@ -629,7 +655,13 @@ impl Listing {
     /// assigned may be any, and a block whose modal state is unknown has none.
     pub fn may_share_frames(&self, a: &Motion, b: &Motion) -> bool {
         let may_be_any = |reason: Option<Reason>| match reason {
-            Some(Reason::Assigned | Reason::HandedOver | Reason::Parameter | Reason::UnknownFlow) => true,
+            Some(
+                Reason::Assigned
+                | Reason::AfterProbing
+                | Reason::HandedOver
+                | Reason::Parameter
+                | Reason::UnknownFlow,
+            ) => true,
             // Frames of NC programs have numbers, and are stated elsewhere.
             Some(_) => !self.numbered,
             None => false,
@@ -652,7 +684,9 @@ impl Listing {
         let tool = match self.tool(motion).map(|tool| &tool.value) {
             Some(Ok(tool)) => tool,
             Some(Err(Reason::Assigned)) => return Some(Reason::ToolAssigned),
-            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange))) => return Some(*reason),
+            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange | Reason::AfterProbing))) => {
+                return Some(*reason);
+            }
             Some(Err(Reason::HandedOver)) => return Some(Reason::ToolHandedOver),
             Some(Err(Reason::Parameter)) => return Some(Reason::ToolParameter),
             Some(Err(_)) => return Some(Reason::ToolUnknown),
@@ -663,7 +697,9 @@ impl Listing {
             Some(Ok(work_object)) if work_object.robhold == tool.robhold => Some(Reason::HeldByBoth),
             Some(Ok(_)) => None,
             Some(Err(Reason::Assigned)) => Some(Reason::WorkObjectAssigned),
-            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange))) => Some(*reason),
+            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange | Reason::AfterProbing))) => {
+                Some(*reason)
+            }
             Some(Err(Reason::HandedOver)) => Some(Reason::WorkObjectHandedOver),
             Some(Err(Reason::Parameter)) => Some(Reason::WorkObjectParameter),
             _ => Some(Reason::WorkObjectUnknown),

@@ -143,11 +143,12 @@ impl<'s> Program<'s> {
         let names = &corrected.listing().files;
         let shown = |text: &str| if text.is_empty() { "nothing".to_owned() } else { format!("`{text}`") };
         let words = |found: TextDifference| {
-            let TextDifference { file, line, here, original } = found;
+            let TextDifference { file, line, here, original, in_motion } = found;
             let name = names.get(file).filter(|_| names.len() > 1);
             let place = name.map_or_else(|| format!("line {line}"), |name| format!("{name} line {line}"));
             let [here, original] = [shown(&here), shown(&original)];
-            format!("{place}: {here} here, {original} in the original, {besides}")
+            let what = if in_motion { "in more than its target" } else { besides };
+            format!("{place}: {here} here, {original} in the original, {what}")
         };
         found.unwrap_or_default().into_iter().map(words).collect()
     }

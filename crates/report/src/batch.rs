@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::compensation::verdict as verdict_of_program;
 use super::document::{Document, KeyFigure, Verdict};
 use super::kept;
-use super::placement;
+use super::placement::{self, Placed};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_compensation::deviation::Status as MotionStatus;
@@ -72,6 +72,12 @@ pub struct Row {
     pub doubt: Option<String>,
     /// The most frequent reason among refused, else flagged, else left motions, with its count.
     pub reason: Option<String>,
+    /// Whether the largest deviations are those of the shape alone.
+    #[serde(default)]
+    pub shape_only: bool,
+    /// How its stationary work objects with corrected motions are placed.
+    #[serde(default)]
+    pub placed: Vec<Placed>,
 }
 
 impl Row {
@@ -102,6 +108,8 @@ impl Row {
             note: undeclared_note(listing),
             doubt: doubt(plan, listing).filter(|_| ended == Ended::Changed),
             reason: most_frequent_reason(plan),
+            shape_only: most.is_some_and(|most| most.shape_only),
+            placed: placement::placed(plan, listing),
         }
     }
 
@@ -119,6 +127,8 @@ impl Row {
             note,
             doubt: None,
             reason: None,
+            shape_only: false,
+            placed: Vec::new(),
         }
     }
 
@@ -223,6 +233,9 @@ pub fn table(rows: &[Row]) -> Table {
             (Column::number("before_mm", "largest before", "mm", 3), |row| row.before_mm.into()),
             (Column::number("after_mm", "largest remainder", "mm", 4), |row| row.after_mm.into()),
             (Column::number("expected_mm", "expected after", "mm", 3), |row| row.expected_mm.into()),
+            (Column::text("figures", "Figures"), |row| {
+                row.shape_only.then(|| "shape only".to_owned()).into()
+            }),
             (Column::count("opaque", "Not read"), |row| row.opaque.into()),
             (Column::text("output", "Written to"), |row| row.output.clone().into()),
             (Column::text("note", "Note"), |row| row.remark().into()),
@@ -371,7 +384,8 @@ fn verdict(rows: &[Row]) -> Verdict {
     let [_, changed, flagged, refused, _] = totals(rows);
     let may_run = rows.iter().filter(|row| row.ended == Ended::Changed && row.is_clean()).count();
     let doubtful = rows.iter().filter(|row| row.doubt.is_some()).count();
-    let status = match (failed.len(), flagged + refused + doubtful) {
+    let apart = placed_apart(rows);
+    let status = match (failed.len(), flagged + refused + doubtful + apart.len()) {
         (0, _) if changed + flagged == 0 => Status::NotEvaluated,
         (0, 0) => Status::Good,
         (0, _) => Status::Warning,
@@ -398,6 +412,10 @@ fn verdict(rows: &[Row]) -> Verdict {
             let are = if may_run == 1 { "is" } else { "are" };
             format!("All programs were processed; {may_run} of {} {are} corrected and may run", rows.len())
         }
+        Status::Warning if flagged + refused + doubtful == 0 => {
+            "All programs were processed, but what they make on one workpiece shifts against each other"
+                .to_owned()
+        }
         Status::Warning | Status::Found => {
             format!("All programs were processed; {}", first(&format!("of {}", rows.len())))
         }
@@ -411,6 +429,7 @@ fn verdict(rows: &[Row]) -> Verdict {
         }
     };
     let mut reasons = vec![sum(rows)];
+    reasons.extend(apart);
     let names: Vec<&str> = rows.iter().map(|row| row.file.as_str()).collect();
     let folder = shared_folder(&names).unwrap_or_default();
     let named = |row: &Row, words: &str| {
@@ -440,6 +459,45 @@ fn verdict(rows: &[Row]) -> Verdict {
     }
     Verdict::new(status, headline, reasons)
 }
+
+/// Whether parts of one workpiece shift against each other, since some programs keep their placement and others correct it.
+pub fn shifts_apart(rows: &[Row]) -> bool {
+    !placed_apart(rows).is_empty()
+}
+
+/// Sentence for each work object of which some programs keep the placement and others correct it.
+fn placed_apart(rows: &[Row]) -> Vec<String> {
+    let mut programs: BTreeMap<(&str, &str), [Vec<&str>; 2]> = BTreeMap::new();
+    for row in rows.iter().filter(|row| row.ended == Ended::Changed) {
+        for placed in &row.placed {
+            let of = programs.entry((&placed.name, &placed.frame)).or_default();
+            of[usize::from(placed.shape_only)].push(&row.file);
+        }
+    }
+    let names: Vec<&str> = rows.iter().map(|row| row.file.as_str()).collect();
+    let folder = shared_folder(&names).unwrap_or_default();
+    let listed = |files: &[&str]| {
+        let some: Vec<String> =
+            files.iter().take(MAX_APART).map(|file| without_folder(file, folder)).collect();
+        let more = files.len().saturating_sub(MAX_APART);
+        if more > 0 { format!("{} and {more} more", some.join(BETWEEN)) } else { some.join(BETWEEN) }
+    };
+    let apart = programs.iter().filter(|(_, [moved, kept])| !moved.is_empty() && !kept.is_empty());
+    apart
+        .map(|((name, _), [moved, kept])| {
+            format!(
+                "{name}: the placement is corrected in {} but not in {}, so that what they make on one workpiece shifts against each \
+                 other. Choose --placement shape or --placement absolute for all, or give programs of RAPID that belong together as one task \
+                 (--together)",
+                listed(moved),
+                listed(kept)
+            )
+        })
+        .collect()
+}
+
+/// Largest number of programs that a sentence names on either side.
+const MAX_APART: usize = 5;
 
 /// Largest number of listed failures; the table has all.
 const MAX_FAILED: usize = 20;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::table::{Column, Table};
@@ -11,6 +12,39 @@ use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_compensation::risk::remedy::Remedy;
 use truegrind_programs::motion::Listing;
+
+/// A work object of a program, and what of it is corrected.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Placed {
+    /// Its name.
+    pub name: String,
+    /// Its frame, as the program states it: objects of one name that lie elsewhere are others.
+    pub frame: String,
+    /// Whether its placement is kept.
+    pub shape_only: bool,
+}
+
+/// How the stationary work objects with corrected motions are placed.
+pub fn placed(plan: &Plan, listing: &Listing) -> Vec<Placed> {
+    let objects =
+        || rewritten(plan).filter_map(|outcome| listing.motions.get(outcome.motion as usize)?.work_object);
+    let used: BTreeSet<u32> = objects().collect();
+    let placement_of = |name: &str| {
+        plan.placements
+            .iter()
+            .find(|placement| !placement.held && names(placement).any(|other| other == name))
+    };
+    let of = |index: u32| {
+        let object = listing.work_objects.get(index as usize)?;
+        let frame = object.value.as_ref().map_or_else(
+            |_| String::new(),
+            |value| format!("{:?} {:?}", value.user_frame, value.object_frame),
+        );
+        let shape_only = placement_of(&object.name)?.applied == Placement::Shape;
+        Some(Placed { name: object.name.clone(), frame, shape_only })
+    };
+    used.into_iter().filter_map(of).collect()
+}
 
 /// Largest number of listed cuts.
 const MAX_LISTED: usize = 12;

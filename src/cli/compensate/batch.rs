@@ -189,6 +189,7 @@ impl BatchReports<'_> {
             programs.extend(done.json.unwrap_or_default());
             diff.extend_from_slice(&done.diff);
         }
+        let clean = clean && !batch::shifts_apart(&rows);
         self.outputs.print(&batch::summary(&rows))?;
         self.outputs.add_made(
             &mut batch,

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use crate::cut::{CutsOf, Obstacle, StartsOf, may_cut};
+use crate::cut::{CutsOf, Obstacle, StartsOf, follows_position, may_cut};
 use crate::deviation::Status;
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget::MANY;
@@ -135,7 +135,8 @@ impl<'a> Starts<'a> {
 
     fn is_path(&self, index: u32) -> bool {
         let motion = &self.listing.motions[index as usize];
-        may_cut(motion) && matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
+        let is_line = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
+        is_line && may_cut(motion) || searches_on_line(motion)
     }
 
     /// The motions of a cut.
@@ -187,6 +188,12 @@ impl<'a> Starts<'a> {
             && way.norm() >= DRAWN_BACK_MM
             && way.dot(&back) >= STRAIGHT_BACK * way.norm()
     }
+}
+
+/// Whether the tool goes on a line until a signal (SearchL, SearchC): tilted, it meets the part elsewhere.
+fn searches_on_line(motion: &Motion) -> bool {
+    let is_line = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
+    is_line && motion.instruction.contains("Search") && !follows_position(motion)
 }
 
 /// Passes over a program in search of starts that are refused; what is left over, the next round of the planner finds.

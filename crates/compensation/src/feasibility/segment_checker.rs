@@ -13,6 +13,7 @@ use super::path_check::{PathCheck, clear, curve_travel, margins};
 use crate::arms::Arms;
 use crate::configuration::monitored;
 use crate::feasibility::joint_limits;
+use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Emit, Options, is_rewritable};
 use crate::plan::reason::OutcomeReason;
@@ -239,6 +240,7 @@ impl SegmentChecker<'_, '_> {
         let far = flange_travel(&start[1], &to.intended.pose(), nominal) * LEVER;
         let end = margins(to.margins, &to.joints, nominal);
         if motion.kind == MotionKind::Linear
+            && motion.axis_turn.is_none()
             && self.is_clear([&from.joints[1], &to.joints], [&from.margins, &end], far)
         {
             return None;
@@ -251,9 +253,7 @@ impl SegmentChecker<'_, '_> {
             }
             _ => return None,
         };
-        let curve_travel = curve_travel(&curves[1], &commanded, nominal);
-        let check = PathCheck { nominal, commanded, curves, curve_travel, samples, options: self.options };
-        check.check_piece(&check.reached(0.0, from.joints[1]), &check.reached(1.0, to.joints))
+        self.curves_fault(motion, curves, &commanded, [from.joints[1], to.joints], samples)
     }
 
     /// The motion with its last target, if it is corrected.
@@ -311,8 +311,9 @@ impl SegmentChecker<'_, '_> {
         }
         let clear = |travel| self.is_clear([&from.joints[1], &to.after], [&there, &here], travel * LEVER);
         let (start, end, nominal) = (&from.commanded, &to.commanded, &self.arms.nominal);
-        // The commanded circle is longer than its chord.
+        // The commanded circle is longer than its chord, and a turn by axes than the shortest one.
         motion.kind == MotionKind::Circular
+            || motion.axis_turn.is_some()
             || from.frames_index != to.frames_index
             || !clear(travel_bound(start, end, nominal)) && !clear(flange_travel(start, end, nominal))
     }
@@ -382,18 +383,32 @@ impl SegmentChecker<'_, '_> {
             ],
             _ => return None,
         };
-        let curve_travel = curve_travel(&curves[1], &commanded, &self.arms.nominal);
-        let check = PathCheck {
-            nominal: &self.arms.nominal,
-            commanded,
-            curves,
-            curve_travel,
-            samples,
-            options: self.options,
-        };
-        let begin = check.reached(0.0, from.joints[1]);
-        let end = check.reached(1.0, to.after);
-        check.check_piece(&begin, &end)
+        self.curves_fault(motion, curves, &commanded, [from.joints[1], to.after], samples)
+    }
+
+    /// Why the tool must not follow a curve (original and commanded) between these joints, in whichever way the control may turn it.
+    fn curves_fault(
+        &self,
+        motion: &Motion,
+        curves: [Curve; 2],
+        commanded: &FramePair,
+        [begin, end]: [Joints; 2],
+        samples: &Cell<usize>,
+    ) -> Option<OutcomeReason> {
+        let nominal = &self.arms.nominal;
+        let by_axes = motion.axis_turn.as_deref().map(|turn| [0, 1].map(|k: usize| curves[k].by_axes(turn)));
+        std::iter::once(curves).chain(by_axes).find_map(|curves| {
+            let curve_travel = curve_travel(&curves[1], commanded, nominal);
+            let check = PathCheck {
+                nominal,
+                commanded: *commanded,
+                curves,
+                curve_travel,
+                samples,
+                options: self.options,
+            };
+            check.check_piece(&check.reached(0.0, begin), &check.reached(1.0, end))
+        })
     }
 
     /// Whether another solution is as near to the start of a joint motion as the intended one.

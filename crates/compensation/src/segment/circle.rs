@@ -1,4 +1,4 @@
-//! Circular motions: deviation of the commanded circle from the intended one, and its replacement by straight segments.
+//! Circular motions, and lines on which the tool does not turn about one axis: deviation of the commanded curve from the intended one, and its replacement by straight segments.
 //!
 //! Method. Kept circle: the commanded circle through the three corrected points is sampled ever more densely until the
 //! samples determine the deviation from the intended circle. Replaced circle: n equal chords of the intended arc whose
@@ -17,7 +17,7 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::Motion;
 use truegrind_programs::rewrite::Extra;
 
-/// A circular motion, as intended and as commanded.
+/// A circular motion, or a line that turns by axes, as intended and as commanded.
 pub(crate) struct Circle {
     pub(crate) intended: Curve,
     pub(crate) commanded: Curve,
@@ -38,7 +38,7 @@ impl Circle {
         })
     }
 
-    /// Largest deviation of the tool from the intended circle (mm), sampled until the samples determine it to [`CHORD_MM`];
+    /// Largest deviation of the tool from the intended curve (mm), sampled until the samples determine it to [`CHORD_MM`];
     /// infinite where the arm cannot follow.
     pub(crate) fn deviation(&self, path: &Segment<'_>, arms: &Arms<'_>) -> f64 {
         let Segment { from, to, .. } = path;
@@ -49,8 +49,8 @@ impl Circle {
             solution.ok().map(|solution| solution.joints)
         };
         let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames.real.target_of(flange), s);
-        // At least one sample per eighth of a turn and per piece of a long arc.
-        let sweep = self.intended.arc().map_or(0.0, |arc| arc.sweep);
+        // At least one sample per eighth of a turn, of the tool too, and per piece of a long arc.
+        let sweep = self.intended.arc().map_or(0.0, |arc| arc.sweep).max(self.intended.axes_turn_rad());
         let pieces = ((sweep / std::f64::consts::FRAC_PI_4).ceil() as usize)
             .max((self.intended.length_mm() / PIECE_MM).ceil() as usize)
             .clamp(4, 64);

@@ -5,7 +5,8 @@
 //! rising along it in proportion to the angle. Orientation on an arc of an NC program: slerp. On one of RAPID: in proportion
 //! within the frame that moves along the path, R(s) = turn(axis, s θ) R₀ exp(s v) with exp(v) = R₀⁻¹ turn(axis, −θ) R₁; among
 //! v, v ± 2π the rotation that passes nearest to the orientation of the circle point is taken; with CirPathMode \CirPointOri
-//! from start over circle point to end.
+//! from start over circle point to end. Where a control may run A, B and C of an NC program linearly, each on its own, and that is
+//! another way ([`AxisTurn`]), [`Curve::by_axes`] is that way.
 //! Shapes: poses of the tool in the work object (mm), shares s of the path from 0 to 1.
 //! Source: ABB, RAPID reference manual, MoveC and CirPathMode; DIN 66025 for G2 and G3. Departure: CirPathMode \ObjectFrame
 //! and the wrist modes are taken as the standard mode; the position on the circle is the same in all.
@@ -17,7 +18,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Motion, Switch};
+use truegrind_programs::motion::{AxisTurn, Motion, Switch};
 
 /// An arc whose ends are closer than this is a full circle (mm). Never less than what the NC writers close: a corrected full
 /// circle whose ends are this close is written as one, and must be followed as one here.
@@ -133,6 +134,16 @@ enum Turning {
     WithPath(Vector3<f64>),
     /// Over the orientation of the circle point, reached at this share.
     Over(UnitQuaternion<f64>, f64),
+    /// By three words that run linearly.
+    Axes(AxisTurn),
+}
+
+/// What a curve has beyond its ends.
+#[derive(Debug, Clone, PartialEq)]
+struct Form {
+    /// Absent on a straight line.
+    arc: Option<Arc>,
+    turning: Turning,
 }
 
 /// The path of the tool from one pose to another.
@@ -142,14 +153,14 @@ pub struct Curve {
     pub from: Pose,
     /// End.
     pub to: Pose,
-    /// Elsewhere, because nearly every curve is a line and is copied a few times.
-    arc: Option<Box<(Arc, Turning)>>,
+    /// Elsewhere, because nearly every curve is a line by the shortest rotation and is copied a few times.
+    form: Option<Box<Form>>,
 }
 
 impl Curve {
     /// A straight line.
     pub fn line(from: Pose, to: Pose) -> Self {
-        Self { from, to, arc: None }
+        Self { from, to, form: None }
     }
 
     /// The arc of a circular motion; `None` where its points make none.
@@ -165,12 +176,24 @@ impl Curve {
         } else {
             with_path(&arc, &from.rotation, &via.rotation, middle, &to.rotation)
         };
-        Some(Self { from, to, arc: Some(Box::new((arc, turning))) })
+        Some(Self { from, to, form: Some(Box::new(Form { arc: Some(arc), turning })) })
+    }
+
+    /// The same path on which the words of orientation run linearly. The words of its ends are those that mean their orientations and are
+    /// nearest to the words of the program, which is how a correction writes them.
+    pub(crate) fn by_axes(&self, turn: &AxisTurn) -> Self {
+        let AxisTurn { convention, from_deg, to_deg } = *turn;
+        let turning = Turning::Axes(AxisTurn {
+            convention,
+            from_deg: convention.angles(&self.from.rotation, from_deg),
+            to_deg: convention.angles(&self.to.rotation, to_deg),
+        });
+        Self { form: Some(Box::new(Form { arc: self.arc().copied(), turning })), ..self.clone() }
     }
 
     /// The arc, where it is one.
     pub fn arc(&self) -> Option<&Arc> {
-        self.arc.as_deref().map(|(arc, _)| arc)
+        self.form.as_deref()?.arc.as_ref()
     }
 
     /// The share at which a point on the arc is passed; one half for a line.
@@ -181,16 +204,24 @@ impl Curve {
 
     /// The pose at a share of the path.
     pub fn at(&self, s: f64) -> Pose {
-        let Some((arc, turning)) = self.arc.as_deref() else { return between(&self.from, &self.to, s) };
+        let Some(Form { arc, turning }) = self.form.as_deref() else {
+            return between(&self.from, &self.to, s);
+        };
         let rotation = match turning {
+            Turning::Axes(turn) => turn.at(s),
             Turning::Shortest => turned(&self.from.rotation, &self.to.rotation, s),
             Turning::WithPath(v) => {
-                arc.turn(s) * self.from.rotation * UnitQuaternion::from_scaled_axis(v * s)
+                let along = arc.map_or_else(UnitQuaternion::identity, |arc| arc.turn(s));
+                along * self.from.rotation * UnitQuaternion::from_scaled_axis(v * s)
             }
             Turning::Over(via, at) if s < *at => turned(&self.from.rotation, via, s / at),
             Turning::Over(via, at) => turned(via, &self.to.rotation, (s - at) / (1.0 - at)),
         };
-        Pose::from_parts(arc.at(s).coords.into(), rotation)
+        let position = match arc {
+            Some(arc) => arc.at(s).coords,
+            None => self.from.translation.vector.lerp(&self.to.translation.vector, s),
+        };
+        Pose::from_parts(position.into(), rotation)
     }
 
     /// Its length (mm).
@@ -203,11 +234,22 @@ impl Curve {
 
     /// Total rotation of the tool (rad), in steps so that a rotation beyond half a turn is seen.
     pub fn turn_rad(&self) -> f64 {
-        if self.arc.is_none() {
+        if self.form.is_none() {
             return self.from.rotation.angle_to(&self.to.rotation);
         }
         let at = |k: i32| self.at(f64::from(k) / 4.0).rotation;
         (0..4).map(|k| at(k).angle_to(&at(k + 1))).sum()
+    }
+
+    /// How far the words of orientation run, all together, where they run linearly; else 0.
+    pub(crate) fn axes_turn_rad(&self) -> f64 {
+        match self.form.as_deref() {
+            Some(Form { turning: Turning::Axes(turn), .. }) => {
+                let ran = turn.from_deg.iter().zip(turn.to_deg).map(|(from, to)| (to - from).abs());
+                ran.sum::<f64>().to_radians()
+            }
+            _ => 0.0,
+        }
     }
 
     /// Distance of a pose from the path (mm), close to this share.

@@ -88,8 +88,10 @@ fn line(
     options: &Options,
 ) -> SegmentPlan {
     let Segment { from, to, .. } = path;
-    let deviation = line_deviation(path, arms, options.emit, middle_mm);
-    let curves = Some([Curve::line(from.intended, to.intended), Curve::line(from.commanded, to.commanded)]);
+    let curves = [Curve::line(from.intended, to.intended), Curve::line(from.commanded, to.commanded)];
+    let deviation =
+        line_deviation(path, arms, options.emit, middle_mm).max(by_axes_mm(motion, path, &curves, arms));
+    let curves = Some(curves);
     let mut out = SegmentPlan { path_deviation_mm: Some(deviation), curves, ..SegmentPlan::default() };
     if deviation <= options.tolerance_mm {
         return out;
@@ -106,6 +108,19 @@ fn line(
     }
     out.flag = (!(left <= options.tolerance_mm)).then_some(OutcomeReason::PathDeviation { mm: left });
     out
+}
+
+/// Deviation on the way that the control may take instead, where A, B and C run linearly (mm); 0 where that is the same way. Which of the
+/// two it takes is not known: the worse counts.
+fn by_axes_mm(
+    motion: &Motion,
+    path: &Segment<'_>,
+    [intended, commanded]: &[Curve; 2],
+    arms: &Arms<'_>,
+) -> f64 {
+    motion.axis_turn.as_deref().map_or(0.0, |turn| {
+        Circle { intended: intended.by_axes(turn), commanded: commanded.by_axes(turn) }.deviation(path, arms)
+    })
 }
 
 fn circle(
@@ -141,7 +156,12 @@ fn circle(
             curves: curves(),
         };
     }
-    let along = circle.deviation(path, arms);
+    let along = circle.deviation(path, arms).max(by_axes_mm(
+        motion,
+        path,
+        &[circle.intended.clone(), circle.commanded.clone()],
+        arms,
+    ));
     let open = if motion.by_radius { circle.open_centre_mm(options.position_decimals) } else { 0.0 };
     let deviation = along + open;
     let flag = if !(along <= options.tolerance_mm) {

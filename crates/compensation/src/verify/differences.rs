@@ -16,6 +16,7 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{
     Frame, Listing, Modal, Motion, MotionKind, Reason, Switch, Tool, WorkObject,
 };
+use truegrind_programs::rewrite::RewriteOptions;
 
 /// How much farther than its neighbours an inserted target may be off the intended path (mm): a program may be verified with another
 /// model than the one that corrected it.
@@ -24,6 +25,16 @@ const FREE_MM: f64 = 0.2;
 const FREE_SHARE: f64 = 0.5;
 /// The largest turn of a joint by a correction that may bring it into another quarter (rad).
 const CORRECTED_TURN_RAD: f64 = 0.5;
+
+/// How much the deviation may change from a cut to an air move beside it, per distance: a placement that is kept is turned by less (rad).
+const FREE_LEVER: f64 = 0.003;
+/// How far an air move may be turned off what the original intends, beyond the original itself (°).
+const FREE_DEG: f64 = 0.3;
+/// Targets are the same within this (mm, rad): numbers are written with fewer decimals.
+const SAME_MM: f64 = 1e-3;
+const SAME_RAD: f64 = 1e-5;
+/// Motions of a program among which the cut of an air move is sought.
+const NEAR_MOTIONS: usize = 50;
 
 /// Two programs, with the ends of their motions.
 pub(super) struct Compared<'a> {
@@ -118,6 +129,9 @@ impl Compared<'_> {
         if let Some(mm) = self.joint_way_off_mm(index, partner) {
             found.push(partner, format!("joint targets that leave the line of the original by {mm:.1} mm"));
         }
+        if let Some(what) = self.air_target_off(index, partner) {
+            found.push(partner, what);
+        }
         // The text of NC programs is compared word by word, and an inserted block near its neighbours may be taken for one of them here.
         if !original.numbered {
             self.compare_settings(index, partner, found);
@@ -200,6 +214,51 @@ impl Compared<'_> {
         unlike_end_mm(after).filter(|mm| *mm > bound_mm)
     }
 
+    /// What is wrong with a changed target of a joint motion, which the figures of the cut do not show: it leads neither where the original
+    /// intends nor as far from there as the cut next to it does, where that keeps its placement.
+    fn air_target_off(&self, index: usize, partner: usize) -> Option<String> {
+        let [was, is] = [&self.original.motions[index], &self.rewritten.motions[partner]];
+        let (before, after) = (self.before[index]?, self.after[partner]?);
+        let turned_rad = (after.joints - before.joints).amax();
+        let is_same = correction(before, after).norm() <= SAME_MM && turned_rad <= SAME_RAD;
+        if !matches!(was.kind, MotionKind::Joint | MotionKind::AbsoluteJoint) || is_same {
+            return None;
+        }
+        if was.kind == MotionKind::AbsoluteJoint && turned_rad > CORRECTED_TURN_RAD {
+            let deg = turned_rad.to_degrees();
+            return Some(format!("{} turns a joint {deg:.0}° farther than in the original", is.instruction));
+        }
+        let off = deviation(before, after);
+        let (beside, apart_mm) =
+            self.deviation_beside(index).unwrap_or_else(|| (deviation(before, before), 0.0));
+        let bound_mm = FREE_MM + FREE_LEVER * apart_mm;
+        if off.norm() > FREE_MM && (off - beside).norm() > bound_mm {
+            let mm = off.norm();
+            return Some(format!("{} ends {mm:.1} mm from where the original intends", is.instruction));
+        }
+        let [deg, had_deg] =
+            [after, before].map(|end| end.reached.rotation.angle_to(&before.commanded.rotation).to_degrees());
+        (deg > had_deg + FREE_DEG)
+            .then(|| format!("{} ends turned by {deg:.1}° from what the original intends", is.instruction))
+    }
+
+    /// The deviation at the nearest motion of a cut, and how far from a motion that is (mm). One path has one placement, whatever its frames.
+    fn deviation_beside(&self, index: usize) -> Option<(Vector3<f64>, f64)> {
+        let place = |end: &ExecutedEnd| (end.base_from_object * end.commanded).translation.vector;
+        let here = place(self.before[index]?);
+        let beside = |other: usize| {
+            let kind = self.original.motions[other].kind;
+            if !matches!(kind, MotionKind::Linear | MotionKind::Circular) {
+                return None;
+            }
+            let (before, after) = (self.before[other]?, self.after[self.partners[other]?]?);
+            Some((deviation(before, after), (place(before) - here).norm()))
+        };
+        // In the text the cut of an approach or a retreat is near.
+        let around = index.saturating_sub(NEAR_MOTIONS)..(index + NEAR_MOTIONS).min(self.before.len());
+        around.filter_map(beside).min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     /// How far joint motions that stand for a line lead off it (mm), if farther than a correction leaves.
     fn joint_way_off_mm(&self, index: usize, partner: usize) -> Option<f64> {
         let [was, is] = [&self.original.motions[index], &self.rewritten.motions[partner]];
@@ -228,13 +287,42 @@ impl Compared<'_> {
         self.partners.iter().flatten().for_each(|partner| is_partner[*partner] = true);
         for added in (0..self.after.len()).filter(|motion| !is_partner[*motion]) {
             match owner[added].and_then(|index| self.off_path_mm(added, index)) {
-                Some((mm, bound_mm)) if mm <= bound_mm => {}
+                Some((mm, bound_mm)) if mm <= bound_mm => {
+                    let partner = owner[added].and_then(|index| self.partners[index]);
+                    if let Some(what) = partner.and_then(|partner| self.inserted_otherwise(added, partner)) {
+                        found.push(added, what);
+                    }
+                }
                 Some((mm, _)) => {
                     found.push(added, format!("an added motion that ends {mm:.1} mm off the original path"))
                 }
                 None => found.push(added, "an added motion that is on no path of the original".to_owned()),
             }
         }
+    }
+
+    /// What an inserted motion has otherwise than a correction writes it: on the way of a line or a circle, with the speed of the motion
+    /// that follows and a small zone.
+    fn inserted_otherwise(&self, added: usize, owner: usize) -> Option<String> {
+        let rewritten = self.rewritten;
+        let [inserted, owner] = [added, owner].map(|motion| &rewritten.motions[motion]);
+        let is_on_way = inserted.kind == MotionKind::Linear
+            || inserted.kind == owner.kind && owner.kind == MotionKind::AbsoluteJoint;
+        if !is_on_way || inserted.rapid {
+            return Some(format!("an added {} on a path that the tool follows", inserted.instruction));
+        }
+        if rewritten.numbered {
+            return None;
+        }
+        let [speed, wanted] = [inserted, owner].map(|motion| rewritten.speed(motion));
+        if !is_same_value(speed.map(|s| (&s.text, &s.value)), wanted.map(|s| (&s.text, &s.value))) {
+            let [speed, wanted] = [speed, wanted].map(|speed| speed.map_or("none", |speed| &speed.text));
+            return Some(format!("an added motion with speed {speed}, before one with speed {wanted}"));
+        }
+        let zone = rewritten.zone(inserted).map_or("none", |zone| &zone.text);
+        let written = RewriteOptions::default().extra_zone;
+        (!zone.eq_ignore_ascii_case(&written))
+            .then(|| format!("an added motion with zone {zone}; a correction writes {written}"))
     }
 
     /// How far an inserted target leads off the way of an original motion (mm), and how far it may; `None` where it cannot have been
@@ -261,12 +349,13 @@ impl Compared<'_> {
         // The start may be stated in another work object.
         let from = end.base_from_object.inverse() * start.base_from_object * start.commanded;
         let way = way(was, from, end.commanded)?;
-        let deviation = |before: &ExecutedEnd, partner: Option<usize>| {
+        let deviation_mm = |before: &ExecutedEnd, partner: Option<usize>| {
             let reached = self.after[partner?]?.reached.translation.vector;
             Some((reached - before.commanded.translation.vector).norm())
         };
         let partner = self.partners[index];
-        let beside = [deviation(start, self.partners[start_index]), deviation(end, partner)].into_iter();
+        let beside =
+            [deviation_mm(start, self.partners[start_index]), deviation_mm(end, partner)].into_iter();
         let beside_mm = beside.flatten().fold(0.0, f64::max);
         Some((way, (1.0 + FREE_SHARE) * beside_mm + FREE_MM))
     }
@@ -288,6 +377,12 @@ fn is_same_value<T: PartialEq>(
         (None, None) => true,
         _ => false,
     }
+}
+
+/// From where the original intends the end of a motion to where the arm comes, in the axes of the base (mm).
+fn deviation(intended: &ExecutedEnd, reached: &ExecutedEnd) -> Vector3<f64> {
+    let in_object = reached.reached.translation.vector - intended.commanded.translation.vector;
+    intended.base_from_object.rotation * in_object
 }
 
 /// How a correction moves the end of a motion, in the work object (mm).

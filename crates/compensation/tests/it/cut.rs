@@ -190,6 +190,27 @@ fn the_approach_to_a_cut_that_is_left_stays_too() {
     );
 }
 
+/// A search that is left began at a corrected place: tilted, its line meets the part elsewhere.
+#[test]
+fn the_start_of_a_search_that_is_left_stays_too() {
+    let air = line(365.0, "z10").replace("MoveL", "MoveJ");
+    let start = line(370.0, "fine");
+    let search = |x: f64| format!("SearchL\\Stop,di1,seen,{},v20,tool0;\n", target(x, 0.0));
+    let found = |body: &[&str]| statuses(&done(&module(&body.concat()), Cuts::Whole, 0.05).0);
+    assert_eq!(found(&[&air, &start, &search(380.0)]), [Changed; 3]);
+    // Out of reach.
+    assert_eq!(found(&[&air, &start, &search(900.0)]), [Refused; 3]);
+    // Left with the line behind it, whose target only the run time tells.
+    let late = line(385.0, "fine").replace("MoveL ", "MoveL Offs(").replace(",v20", ",0,0,AInput(ai1)),v20");
+    assert_eq!(found(&[&air, &start, &search(380.0), &late])[..2], [Refused; 2]);
+    let joints = Options { emit: Emit::Joints, ..Options::default() };
+    let source = module(&[air.as_str(), &start, &search(380.0)].concat());
+    let program = Program::Rapid(Task::read(&[("p.mod", source.as_bytes())]));
+    let done = compensate(&program, &known(), &Cell::default(), &joints, None).unwrap();
+    let found = statuses(&done);
+    assert!(found[2].is_written() == found[1].is_written(), "{found:?}");
+}
+
 /// Lines lead from cut to cut, and one is left: its start was corrected with the cut of lines before it.
 #[test]
 fn the_start_of_a_cut_that_is_left_stays_whatever_leads_to_it() {

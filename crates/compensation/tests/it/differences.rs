@@ -188,3 +188,43 @@ fn a_joint_target_that_kept_a_line_and_is_lost_is_told() {
     let found = judged(&long, &kept.join("\n")).differences;
     assert!(found.iter().any(|sentence| sentence.contains("leave the line")), "{found:?}\n{text}");
 }
+
+/// What the figures of the cut do not show: where air moves lead, and how inserted targets are reached.
+#[test]
+fn targets_of_air_moves_and_the_kind_of_inserted_motions_are_compared() {
+    let text = corrected(&plain());
+    let approach = text.lines().find(|line| line.contains("MoveJ [[")).unwrap();
+    let height = approach.split(&['[', ']'][..]).nth(2).unwrap().split(',').nth(2).unwrap();
+    for by_mm in [0.5, 5.0, -20.0, -60.0] {
+        let moved = height.parse::<f64>().unwrap() + by_mm;
+        let edited = text.replace(approach, &approach.replacen(height, &moved.to_string(), 1));
+        assert_ne!(edited, text);
+        let found = judged(&program(), &edited).differences;
+        assert!(
+            found.len() == 1 && found[0].contains("from where the original intends"),
+            "{by_mm}: {found:?}"
+        );
+    }
+    // Joint targets stay, or move by a correction alone.
+    let joints =
+        "    MoveAbsJ [[0,10,10,0,70,0],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v100,fine,tS;\n    unknownMotion";
+    let [original, with_joints] = [program(), text].map(|text| text.replace("    unknownMotion", joints));
+    assert_eq!(judged(&original, &with_joints).differences, Vec::<String>::new());
+    for (to, words) in [("[[30,10", "turns a joint"), ("[[0,10.5", "from where"), ("[[0,60", "turns a joint")]
+    {
+        let found = judged(&original, &with_joints.replace("[[0,10", to)).differences;
+        assert!(found.iter().any(|sentence| sentence.contains(words)), "{to}: {found:?}");
+    }
+    // The first inserted motion as another one.
+    let dense = corrected(&Options { tolerance_mm: 0.001, ..plain() });
+    assert_eq!(judged(&program(), &dense).differences, Vec::<String>::new());
+    let line = dense.lines().find(|line| line.contains("MoveL")).unwrap();
+    for (from, to, words) in [
+        ("MoveL", "MoveJ", "an added MoveJ"),
+        ("v100", "v1000", "an added motion with speed v1000, before one with speed v100"),
+        (",z1,", ",z100,", "an added motion with zone z100"),
+    ] {
+        let found = judged(&program(), &dense.replacen(line, &line.replace(from, to), 1)).differences;
+        assert!(found.iter().any(|sentence| sentence.contains(words)), "{words}: {found:?}");
+    }
+}

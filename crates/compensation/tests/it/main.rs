@@ -11,6 +11,7 @@ mod segment;
 mod circles;
 mod payload;
 mod placement;
+mod axis_turns;
 mod backlash;
 mod beyond_noise;
 mod joint_limits;

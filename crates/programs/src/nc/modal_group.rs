@@ -64,6 +64,8 @@ pub(super) enum ModalGroup {
     AxisScaling,
     /// Offsets of A, B, C (G92 A0).
     RotaryOffset,
+    /// FUNCTION TCPM REFPNT: 1 where the programmed point is not the tip.
+    ReferencePoint,
     // Groups that matter for some motions only.
     /// G90.1, G91.1: absolute or incremental arc centres.
     ArcCentreMode,

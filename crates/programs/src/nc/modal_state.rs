@@ -50,6 +50,8 @@ pub(super) struct AssignedFrames {
     ever: Map<String, ()>,
     /// Whether any other name may have been assigned too.
     any: bool,
+    /// Whether a probing cycle may have done so.
+    by_probing: bool,
     /// Names with offsets of rotary axes, which a shift and a rotation about Z cannot represent.
     rotary: Map<String, ()>,
     /// Whether any other name may have such offsets too.
@@ -86,6 +88,17 @@ impl AssignedFrames {
         }
     }
 
+    /// Why what is assigned is unknown.
+    pub(super) fn reason(&self) -> Reason {
+        if self.by_probing { Reason::AfterProbing } else { Reason::Assigned }
+    }
+
+    /// A probing cycle may have assigned any of them any value.
+    pub(super) fn invalidate_by_probing(&mut self) {
+        self.invalidate();
+        self.by_probing = true;
+    }
+
     /// Any of them may have been assigned any value.
     pub(super) fn invalidate(&mut self) {
         self.by_name = Map::new();
@@ -100,6 +113,7 @@ impl AssignedFrames {
         self.by_name = self.by_name.joined(&other.by_name, &agree);
         self.ever = self.ever.joined(&other.ever, &|_, _| Some(()));
         self.any |= other.any;
+        self.by_probing |= other.by_probing;
         self.rotary = self.rotary.joined(&other.rotary, &|_, _| Some(()));
         self.any_rotary |= other.any_rotary;
     }

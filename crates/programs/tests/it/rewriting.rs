@@ -461,3 +461,58 @@ fn what_differs_outside_the_motions_is_told() {
         assert!(found.len() == 1 && found[0].contains(words), "{from}: {found:?}");
     }
 }
+
+/// Text that changed its place between motions, and arguments of a motion besides its target: both were "ok".
+#[test]
+fn the_place_of_text_and_the_other_arguments_of_motions_are_compared() {
+    let at = |x: f64| format!("[[{x},0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    let lines = [
+        "MoveAbsJ [[0,10,10,0,70,0],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v1000,fine,tool0;".to_owned(),
+        format!("MoveJ {},v100,z10,tool0;", at(500.0)),
+        format!("MoveJ {},v100,fine,tool0;", at(505.0)),
+        "SetDO do1,1;".to_owned(),
+        format!("MoveL {},v50,z1,tool0;", at(510.0)),
+        format!("TriggL ToPoint:={},v50,trg1,z1,tool0;", at(515.0)),
+        format!("MoveC {},{},v50,fine,tool0;", at(520.0), at(525.0)),
+        format!("MoveLDO {},v50,fine,tool0,do1,0;", at(530.0)),
+    ];
+    let module = |lines: &[String]| {
+        let body = lines.join("\n");
+        format!("MODULE M\nVAR triggdata trg1;\nPROC main()\n{body}\nENDPROC\nENDMODULE\n")
+    };
+    let read = |text: &str| Program::read(&[("m.mod", text.to_owned().leak().as_bytes())], &Setup::default());
+    let original = module(&lines);
+    let found = |lines: &[String]| read(&original).text_differences(&read(&module(lines)));
+    assert_eq!(read(&original).listing().motions.iter().filter(|m| m.reason().is_none()).count(), 7);
+    // What a correction does: targets, inserted motions, a circle in pieces, joints.
+    let mut corrected = lines.clone();
+    corrected[4] = format!("MoveL {0},v50,z1,tool0;\nMoveL {0},v50,z1,tool0;", at(511.0));
+    corrected[6] = format!("MoveL {0},v50,z1,tool0;\nMoveL {0},v50,fine,tool0;", at(526.0));
+    assert_eq!(found(&corrected), Vec::<String>::new());
+    corrected[4] = lines[4]
+        .replace("MoveL", "MoveAbsJ")
+        .replace(&at(510.0), "[[0,10,10,0,70,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    assert_eq!(found(&corrected), Vec::<String>::new());
+    corrected[4] = lines[4].clone();
+    let with = |edit: &dyn Fn(&mut [String])| {
+        let mut lines = corrected.clone();
+        edit(&mut lines);
+        let found = found(&lines);
+        assert_eq!(found.len(), 1, "{lines:?}");
+        found[0].clone()
+    };
+    let earlier = with(&|lines| lines.swap(2, 3));
+    assert!(earlier.starts_with("line 6: `SetDO do1,1;` here, `MoveJ [[505"), "{earlier}");
+    let later = with(&|lines| lines.swap(3, 4));
+    assert!(later.contains("`MoveL [[510"), "{later}");
+    for (line, from, to) in [
+        (0, "\\NoEOffs", ""),
+        (5, "trg1", "trg2"),
+        (6, "v50", "v51"),
+        (7, "do1,0", "do2,0"),
+        (7, "MoveLDO", "MoveL"),
+    ] {
+        let told = with(&|lines| lines[line] = lines[line].replace(from, to));
+        assert!(told.contains("in more than its target"), "{from}: {told}");
+    }
+}

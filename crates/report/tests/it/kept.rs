@@ -9,9 +9,10 @@ use truegrind_compensation::deviation::{
 };
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
-use truegrind_report::batch::{Ended, Row};
+use truegrind_report::batch::{self, Ended, Row};
 use truegrind_report::deviation::{from_kept, kept};
 use truegrind_report::kept::{Packed, unpacked};
+use truegrind_report::placement::Placed;
 
 /// Any finite number, with all its bits.
 fn number() -> impl Strategy<Value = f64> {
@@ -130,6 +131,8 @@ proptest! {
             note: Some(text.clone()),
             doubt: Some(text.clone()),
             reason: None,
+            shape_only: true,
+            placed: vec![Placed { name: text.clone(), frame: text.clone(), shape_only: true }],
         };
         let back: Row = serde_json::from_str(&serde_json::to_string(&row).unwrap()).unwrap();
         prop_assert_eq!(format!("{row:?}"), format!("{back:?}"));
@@ -147,4 +150,28 @@ fn what_is_no_path_is_none() {
     {
         assert!(from_kept(&serde_json::from_str(text).unwrap()).is_none(), "{text}");
     }
+}
+
+/// Two programs of one workpiece, of which one kept its placement: each may run, both together do not fit.
+#[test]
+fn programs_of_one_work_object_that_are_placed_differently_are_told() {
+    let row = |file: &str, name: &str, frame: &str, shape_only: bool| Row {
+        motions: [8, 6, 0, 0, 2],
+        before_mm: Some(0.5),
+        shape_only,
+        placed: vec![Placed { name: name.to_owned(), frame: frame.to_owned(), shape_only }],
+        ..Row::without(file.to_owned(), Ended::Changed, None)
+    };
+    let told = |rows: &[Row]| {
+        assert_eq!(
+            batch::shifts_apart(rows),
+            !truegrind_report::format::terminal::document(&batch::summary(rows), 200).contains("may run")
+        );
+        batch::shifts_apart(rows)
+    };
+    let moved = row("parts/p3.mod", "wA", "here", false);
+    assert!(told(&[moved.clone(), row("parts/p4.mod", "wA", "here", true)]));
+    assert!(!told(&[moved.clone(), row("parts/p4.mod", "wA", "here", false)]));
+    assert!(!told(&[moved.clone(), row("parts/p4.mod", "wB", "here", true)]));
+    assert!(!told(&[moved, row("parts/p4.mod", "wA", "elsewhere", true)]));
 }

@@ -282,9 +282,15 @@ impl Interpreter<'_, '_> {
             (b"MCALL", _) => {
                 let is_subprogram = block.words.iter().skip_while(|word| !word.is("MCALL")).nth(1);
                 let program = |word: &Word<'_>| program_of(&String::from_utf8_lossy(word.name));
+                let name = |word: &Word<'_>| word.name.to_ascii_uppercase();
+                if is_subprogram.is_some_and(|word| super::siemens_names::is_measuring_cycle(&name(word))) {
+                    // It runs behind every motion from here on.
+                    self.list_left(block, "MCALL", Reason::Probe);
+                    self.invalidate_by_probing();
+                }
                 self.pass.modal_callee = is_subprogram.map(program);
                 self.state.modal_call = is_subprogram.map(|word| {
-                    let cycle = super::siemens_names::is_cycle(&word.name.to_ascii_uppercase());
+                    let cycle = super::siemens_names::is_cycle(&name(word));
                     if cycle { Reason::Cycle } else { Reason::Subprogram }
                 });
                 true

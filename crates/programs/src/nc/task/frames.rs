@@ -361,12 +361,9 @@ impl Interpreter<'_, '_> {
         }
         known_value &= !self.state.work_offset.assigned.is_rotary(name);
         match block.radius.map(|index| self.number(&block.words[index])) {
-            // The rotation of the work frame about z (LinuxCNC).
-            Some(Some(angle)) => {
-                let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle.to_radians());
-                frame.quaternion = [rotation.w, rotation.i, rotation.j, rotation.k];
-            }
-            Some(None) => known_value = false,
+            // A rotation about z (LinuxCNC): it turns X and Y, but not A, B and C, so that no frame describes it.
+            Some(Some(0.0)) => frame.quaternion = Frame::IDENTITY.quaternion,
+            Some(_) => known_value = false,
             None => {}
         }
         self.assign_offset(name, known_value.then_some(frame));
@@ -400,7 +397,7 @@ impl Interpreter<'_, '_> {
             // One of its lengths has not been set yet.
             Some(Some(frame)) if frame.position_mm.iter().any(|mm| mm.is_nan()) => Err(Reason::ToolUnknown),
             Some(Some(frame)) => Ok(frame),
-            Some(None) => Err(Reason::Assigned),
+            Some(None) => Err(self.state.tool.assigned.reason()),
             None => self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown),
         }
     }
@@ -409,7 +406,7 @@ impl Interpreter<'_, '_> {
     pub(super) fn frame_value(&self, name: &str) -> Result<Frame, Reason> {
         match self.state.work_offset.assigned.get(name) {
             Some(Some(frame)) => Ok(frame),
-            Some(None) => Err(Reason::Assigned),
+            Some(None) => Err(self.state.work_offset.assigned.reason()),
             // Without a settable offset Siemens uses the basic frame.
             None => self
                 .frames

@@ -141,7 +141,11 @@ impl<'s> Interpreter<'_, 's> {
             }
             b"TCH" => {
                 self.list_left(block, "TCH PROBE", Reason::Probe);
-                self.invalidate_position();
+                let number = words.get(2).copied().unwrap_or_default();
+                match measures_only(number) {
+                    true => self.invalidate_position(),
+                    false => self.invalidate_by_probing(),
+                }
             }
             b"BEGIN" | b"END" => {
                 if words.contains(&&b"INCH"[..]) {
@@ -202,8 +206,11 @@ impl<'s> Interpreter<'_, 's> {
                     self.invalidate_pose();
                 }
             }
-            (b"FUNCTION", b"TCPM") => self.set_tcp_mode(true, false),
-            (b"FUNCTION", _) if words.contains(&&b"TCPM"[..]) => self.set_tcp_mode(false, false),
+            (b"FUNCTION", b"TCPM") => self.function_tcpm(words),
+            (b"FUNCTION", _) if words.contains(&&b"TCPM"[..]) => {
+                self.set_tcp_mode(false, false);
+                self.set_reference_point(true);
+            }
             // The default mode of a mill. The name of a kinematic model may follow, whose effect is unknown.
             (b"FUNCTION", b"MODE") => return words[2..] == [b"MILL"],
             (b"FUNCTION", b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
@@ -224,6 +231,23 @@ impl<'s> Interpreter<'_, 's> {
             _ => return false,
         }
         true
+    }
+
+    /// `FUNCTION TCPM F TCP AXIS SPAT PATHCTRL AXIS REFPNT TIP-CENTER`. Without REFPNT the reference is the tip.
+    fn function_tcpm(&mut self, words: &[&[u8]]) {
+        let mut stated = words.iter().skip_while(|word| **word != b"REFPNT").skip(1);
+        let is_tip = stated.next().is_none_or(|point| *point == b"TIP-TIP");
+        self.set_tcp_mode(true, false);
+        self.set_reference_point(is_tip);
+    }
+
+    /// Where the programmed point becomes another one of the tool, its coordinates change.
+    fn set_reference_point(&mut self, is_tip: bool) {
+        let group = ModalGroup::ReferencePoint;
+        if is_tip == self.state.groups.is_on(group) || self.state.unknown_reason(group.bit()).is_some() {
+            self.invalidate_position();
+        }
+        self.set_group(group, u64::from(!is_tip));
     }
 
     /// Blocks with unsupported paths. True if the block is one of them.
@@ -468,6 +492,13 @@ impl<'s> Interpreter<'_, 's> {
             self.state.variables.invalidate(Reason::UnknownVariable);
         }
     }
+}
+
+/// Whether a TCH PROBE cycle certainly sets neither presets nor tools: REF. PLANE, POLAR PRESET, MEASURING, MEASURING IN 3-D, MEASURE ANGLE,
+/// MEASURE PLANE, FAST PROBING. Lines of a definition (`31.1`) have the number of their cycle.
+fn measures_only(number: &[u8]) -> bool {
+    let whole = number.split(|byte| *byte == b'.').next().unwrap_or_default();
+    matches!(whole, b"0" | b"1" | b"3" | b"4" | b"420" | b"431" | b"441")
 }
 
 /// Cycles of one and two digits that a definition only prepares.

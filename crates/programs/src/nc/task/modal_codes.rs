@@ -177,6 +177,14 @@ impl Interpreter<'_, '_> {
         self.invalidate_pose();
     }
 
+    /// A probing cycle of the control may set work offsets, their rotation and tools from what it measures.
+    pub(super) fn invalidate_by_probing(&mut self) {
+        self.invalidate_offsets();
+        self.invalidate_tools();
+        self.state.work_offset.assigned.invalidate_by_probing();
+        self.state.tool.assigned.invalidate_by_probing();
+    }
+
     /// Whether G50 or G92 states a spindle speed limit, and not a position.
     pub(super) fn limits_spindle(&self, block: &Block<'_>) -> bool {
         !block.has_motion_words()

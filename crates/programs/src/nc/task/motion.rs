@@ -13,37 +13,49 @@ use super::super::orientation::Angles;
 use super::super::syntax::{Word, WordValue};
 use super::{Block, BlockArc, BlockContext, FlowPoint, Interpreter, StartDependency, StateEvent};
 use crate::motion::{
-    FARTHEST_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
-    SpeedValue, Switch, TargetValue, Zone, ZoneValue,
+    AxisTurn, FARTHEST_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span,
+    Speed, SpeedValue, Switch, TargetValue, Zone, ZoneValue,
 };
 use truegrind_math::option_f64::OptionF64;
 
 /// How far the two ways of turning the tool along a line may lie apart (rad).
 const ONE_WAY_RAD: f64 = 1e-3;
 
-/// Whether the tool turns alike along a line if A, B and C run linearly, as axes do, and if it turns about one axis. Which of the two a control
-/// does, its set-up decides (ORIAXES, ORIVECT; PATHCTRL): between ends for which they differ, no orientation can be inserted.
-fn turns_one_way(from: &Orientation, to: &Orientation, angles: Option<Angles>) -> bool {
+/// How the tool turns along a path.
+enum Turn {
+    /// Alike whether A, B and C run linearly, as axes do, or the tool turns about one axis.
+    OneWay,
+    /// Differently. Which of the two a control does, its set-up decides (ORIAXES, ORIVECT; PATHCTRL): no orientation can be inserted, and the
+    /// worse of both counts.
+    TwoWays(AxisTurn),
+    /// Between words of two kinds.
+    Unknown,
+}
+
+fn turn_between(from: &Orientation, to: &Orientation, angles: Option<Angles>) -> Turn {
     let of = |orientation: &Orientation| match orientation.mode {
         OrientationMode::Angles => Some((angles?, all_known(orientation.abc).ok()?)),
         OrientationMode::Rpy => Some((Angles::Wpr, all_known(orientation.rpy).ok()?)),
         OrientationMode::Vector | OrientationMode::Unknown(_) => None,
     };
     if to.mode == OrientationMode::Vector {
-        return true;
+        return Turn::OneWay;
     }
     // Without a known start nothing is inserted.
-    let (Some((convention, start)), Some((other, end))) = (of(from), of(to)) else { return from == to };
+    let (Some((convention, start)), Some((other, end))) = (of(from), of(to)) else {
+        return if from == to { Turn::OneWay } else { Turn::Unknown };
+    };
     if convention != other {
-        return false;
+        return Turn::Unknown;
     }
-    let [first, last] = [start, end].map(|values| convention.rotation(values));
-    start == end
-        || [0.25, 0.5, 0.75].iter().all(|&share| {
-            let linear = std::array::from_fn(|axis| start[axis] + share * (end[axis] - start[axis]));
-            let about_one_axis = first.try_slerp(&last, share, 1e-9);
-            about_one_axis.is_some_and(|turn| turn.angle_to(&convention.rotation(linear)) <= ONE_WAY_RAD)
-        })
+    let turn = AxisTurn { convention, from_deg: start, to_deg: end };
+    let about_one_axis = |share| turn.at(0.0).try_slerp(&turn.at(1.0), share, 1e-9);
+    let is_alike = |&share: &f64| {
+        about_one_axis(share).is_some_and(|turned| turned.angle_to(&turn.at(share)) <= ONE_WAY_RAD)
+    };
+    // Whole turns that are multiples of each other must not hide at all of these.
+    let one_way = start == end || [0.1, 0.25, 0.5, 0.75, 0.93].iter().all(is_alike);
+    if one_way { Turn::OneWay } else { Turn::TwoWays(turn) }
 }
 
 impl Interpreter<'_, '_> {
@@ -260,9 +272,11 @@ impl Interpreter<'_, '_> {
             motion.own_reason = Some(Reason::TurnAlone);
             motion.speed = None;
         }
-        let splits = !motion.timed
-            && self.can_split(block, &before)
-            && turns_one_way(&old, &self.state.orientation, self.angles);
+        let turn = turn_between(&old, &self.state.orientation, self.angles);
+        let splits = !motion.timed && self.can_split(block, &before) && matches!(turn, Turn::OneWay);
+        if let Turn::TwoWays(turn) = turn {
+            motion.axis_turn = Some(Box::new(turn));
+        }
         motion.insertable = splits && kind == MotionKind::Linear && !block.flags.other_axes;
         motion.can_straighten = splits && arc.is_some() && !block.flags.opaque;
         motion.axis = arc.map(|block_arc| Box::new(block_arc.arc.plane.axis(block_arc.positive)));
@@ -604,6 +618,8 @@ impl Interpreter<'_, '_> {
             Some(reason)
         } else if state.groups.active_transforms() != 0 {
             Some(Reason::Transformed)
+        } else if state.groups.is_on(ModalGroup::ReferencePoint) {
+            Some(Reason::ReferencePoint)
         } else if block.flags.other_axes && self.has_incremental_uvw() {
             Some(Reason::UnknownWord)
         } else if self.dialect == Dialect::Heidenhain

@@ -35,8 +35,7 @@ impl Interpreter<'_, '_> {
             Action::UnknownEnd(reason) => self.leave_unknown_end(block, code, reason),
             Action::Measure => {
                 self.leave_unknown_end(block, code, Reason::Probe);
-                self.invalidate_offsets();
-                self.invalidate_tools();
+                self.invalidate_by_probing();
             }
             Action::RigidTapping => {
                 self.leave_unknown_end(block, code, Reason::UnsupportedPath);

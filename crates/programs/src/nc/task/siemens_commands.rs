@@ -5,7 +5,7 @@ use super::super::modal_group::ModalGroup;
 use super::super::modal_state::MotionMode;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
-use super::siemens_names::{is_cycle, is_harmless_call, is_keyword};
+use super::siemens_names::{is_cycle, is_harmless_call, is_keyword, is_measuring_cycle};
 use super::{Block, Interpreter};
 use crate::motion::Reason;
 
@@ -42,6 +42,11 @@ impl Interpreter<'_, '_> {
                     done = true;
                 }
                 WordValue::Arguments { .. } if is_harmless_call(&name) => {}
+                _ if is_measuring_cycle(&name) => {
+                    self.list_left(block, &String::from_utf8_lossy(&name), Reason::Probe);
+                    self.invalidate_by_probing();
+                    done = true;
+                }
                 WordValue::Arguments { .. } if is_cycle(&name) => {
                     self.list_left(block, &String::from_utf8_lossy(&name), Reason::Cycle);
                     self.invalidate_position();

@@ -90,6 +90,15 @@ pub(super) fn is_cycle(name: &[u8]) -> bool {
     ["CYCLE", "POCKET", "HOLES", "SLOT", "LONGHOLE"].iter().any(|kind| name.starts_with(kind.as_bytes()))
 }
 
+/// Whether a name is a measuring cycle (CYCLE961 to CYCLE998, CYCLE9960): each can write work offsets, tools or kinematic data, by parameters
+/// of which some are coded digit by digit.
+pub(super) fn is_measuring_cycle(name: &[u8]) -> bool {
+    match name.strip_prefix(b"CYCLE") {
+        Some([b'9', b'6'..=b'9', b'0'..=b'9', rest @ ..]) => rest.iter().all(u8::is_ascii_digit),
+        _ => false,
+    }
+}
+
 /// A code as a program writes it: G54, G43.4.
 pub(super) fn code_name(code: u32) -> String {
     match (code / 10, code % 10) {

@@ -532,3 +532,77 @@ fn harmless_names_are_listed_with_their_uses() {
         assert!(!certain(block), "{block}");
     }
 }
+
+/// LinuxCNC turns X and Y by the R of an offset, and leaves A, B and C alone: no frame of tool poses does that.
+#[test]
+fn a_rotation_of_the_offset_does_not_turn_the_tool() {
+    for dialect in [LinuxCnc, Iso] {
+        for turn in ["R30", "R-90", "R[#5]", "R0.001"] {
+            check(dialect, &[(&format!("G10 L2 P1 X510 Y0 Z0 {turn}\n{G}"), &[left(WorkObjectAssigned)])]);
+        }
+        check(dialect, &[(&format!("G10 L2 P1 X510 Y0 Z0 R30\nG10 L2 P1 X510 Y0 Z0 R0\n{G}"), &[None])]);
+        let kept = format!("G10 L2 P1 X510 Y0 Z0 R30\nG10 L2 P1 X510 Y0 Z0\n{G}");
+        check(dialect, &[(&kept, &[left(WorkObjectAssigned)])]);
+    }
+}
+
+/// Cycles of the control that measure can write what they measured into work offsets, rotations and tools, of which the text shows nothing.
+#[test]
+fn behind_a_measuring_cycle_frame_and_tool_are_unknown() {
+    let (probe, after) = (left(Probe), left(AfterProbing));
+    let l = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
+    let preset = "CYCL DEF 247 DATUM SETTING Q339=1";
+    for number in [
+        "404 SET BASIC ROTATION",
+        "400",
+        "405",
+        "410",
+        "419",
+        "425",
+        "451",
+        "481",
+        "1410",
+        "2.0",
+        "31.0",
+        "463",
+    ] {
+        check(Heidenhain, &[(&format!("TCH PROBE {number}\n{l}"), &[probe, after])]);
+        // Selecting the tool again does not help: its line of the table may be another.
+        check(Heidenhain, &[(&format!("TCH PROBE {number}\nTOOL CALL 1 Z S5\n{l}"), &[probe, after])]);
+    }
+    for number in ["0.0", "1.0", "3.0", "420 MEASURE ANGLE", "431", "441"] {
+        check(Heidenhain, &[(&format!("TCH PROBE {number}\n{l}"), &[probe, None])]);
+    }
+    assert_eq!(reasons(Heidenhain, &format!("TCH PROBE 410\n{preset}\n{l}"))[0], probe);
+    assert_ne!(reasons(Heidenhain, &format!("TCH PROBE 410\n{preset}\n{l}"))[1], None);
+    for cycle in
+        ["CYCLE977(101,1)", "CYCLE961(1)", "CYCLE998(105)", "CYCLE982(1,1)", "CYCLE996", "CYCLE9960(1)"]
+    {
+        check(Siemens, &[(&format!("{cycle}\n{S}\nG54\n{S}"), &[probe, after, after])]);
+        let assigned = format!("{cycle}\n$P_UIFR[1]=CTRANS(X,400)\nG54\n{S}");
+        check(Siemens, &[(&assigned, &[probe, after])]);
+    }
+    check(Siemens, &[(&format!("MCALL CYCLE977(101)\n{S}\nMCALL\n{S}"), &[probe, left(Cycle), after])]);
+    // Those that turn or mill set nothing.
+    check(Siemens, &[(&format!("CYCLE952(1)\n{S}"), &[left(Cycle), None])]);
+    check(Fanuc, &[(&format!("G37 Z50.\n{F}"), &[probe, after])]);
+}
+
+#[test]
+fn points_of_the_tool_other_than_its_tip_are_not_corrected() {
+    let point = left(ReferencePoint);
+    let l = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
+    let tcpm = |point: &str| format!("FUNCTION TCPM F TCP AXIS SPAT PATHCTRL VECTOR{point}\n{l}\nL X+6");
+    for (stated, expected) in [
+        ("", None),
+        (" REFPNT TIP-TIP", None),
+        (" REFPNT TIP-CENTER", point),
+        (" REFPNT CENTER-CENTER", point),
+    ] {
+        check(Heidenhain, &[(&tcpm(stated), &[expected, expected])]);
+    }
+    let back = format!("{}\n{}", tcpm(" REFPNT CENTER-CENTER"), tcpm(" REFPNT TIP-TIP"));
+    check(Heidenhain, &[(&back, &[point, point, None, None])]);
+    let reset = format!("{}\nFUNCTION RESET TCPM\nM128\n{l}", tcpm(" REFPNT TIP-CENTER"));
+    check(Heidenhain, &[(&reset, &[point, point, None])]);
+}
