@@ -1,4 +1,5 @@
-//! Circular motions, and lines on which the tool does not turn about one axis: deviation of the commanded curve from the intended one, and its replacement by straight segments.
+//! Circular motions, and lines on which the tool does not turn about one axis: deviation of the commanded curve from the intended one, and
+//! its replacement by straight segments.
 //!
 //! Method. Kept circle: the commanded circle through the three corrected points is sampled ever more densely until the
 //! samples determine the deviation from the intended circle. Replaced circle: n equal chords of the intended arc whose

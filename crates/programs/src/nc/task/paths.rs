@@ -3,9 +3,10 @@
 //!
 //! Method: a pass over the text adds to each place what leads there; passes repeat until none adds anything. What they find then holds on
 //! every path, whatever they began with and whether or not the transfer function is monotone. They begin with the guess that calls change
-//! nothing, since otherwise each of many calls in a row would take a pass; what followed from wrong guesses is then dropped. Code that no path reaches contributes nothing at first; once nothing
-//! changes, it is taken to run in the state of [`Interpreter::join_unseen_predecessors`], in case it is reached after all. A file with a jump
-//! or call that may lead anywhere is read by that rule alone.
+//! nothing, since otherwise each of many calls in a row would take a pass; what followed from wrong guesses is then dropped. Code that no path
+//! reaches contributes nothing at first; once nothing changes, it is taken to run in the state of
+//! [`Interpreter::join_unseen_predecessors`], in case it is reached after all. A file with a jump or call that may lead anywhere is read by
+//! that rule alone.
 
 use std::collections::HashMap;
 
