@@ -4,8 +4,8 @@
 //! what the model lacks (gears, bearings, weight) depends on the pose: the correlation between two poses is exp(−|Δq|/ℓ), with |Δq| the
 //! length of the difference of their six joint angles and ℓ = 20°. That is an assumption: measured poses lie farther apart than a cut is
 //! long, so that they hardly show it. On 90 simulated arms, measured at 200 random poses or at 30 to 60 round a part, the error of a program's
-//! shape is 0.2 to 0.6 of the stated one (medians) where all that the model lacks has one or two periods per turn of a joint, and 0.5 to 1.8
-//! where motors ripple and gears have play. Without these errors it was 1.1 to 4 and 5 to 9 times the stated one.
+//! shape is 0.2 to 0.5 of the stated one (medians) where all that the model lacks has one or two periods per turn of a joint, and 0.5 to 1.5
+//! where motors ripple and gears have play. Without these errors it was 1.1 to 4.3 and 5 to 9 times the stated one.
 //!
 //! With uⱼ(p) = sⱼ zⱼ × (p − oⱼ) the covariance of the displacements of two points is k(p, p') Σⱼ uⱼ(p) uⱼ(p')ᵀ. A registration is linear in
 //! the displacements of its points, T d, and leaves of a point i the displacement dᵢ − Wᵢ T d.

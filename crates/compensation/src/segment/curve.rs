@@ -6,7 +6,7 @@
 //! within the frame that moves along the path, R(s) = turn(axis, s θ) R₀ exp(s v) with exp(v) = R₀⁻¹ turn(axis, −θ) R₁; among
 //! v, v ± 2π the rotation that passes nearest to the orientation of the circle point is taken; with CirPathMode \CirPointOri
 //! from start over circle point to end. Where a control may run A, B and C of an NC program linearly, each on its own, and that is
-//! another way ([`AxisTurn`]), [`Curve::by_axes`] is that way.
+//! another way ([`AxisTurn`]), `Curve::by_axes` is that way.
 //! Shapes: poses of the tool in the work object (mm), shares s of the path from 0 to 1.
 //! Source: ABB, RAPID reference manual, MoveC and CirPathMode; DIN 66025 for G2 and G3. Departure: CirPathMode \ObjectFrame
 //! and the wrist modes are taken as the standard mode; the position on the circle is the same in all.
