@@ -7,6 +7,7 @@
 //! Units are those of the file: mm, degrees for joint targets, quaternions scalar first and exactly as written (not
 //! normalised; [`RobTarget::pose`] and [`Frame::pose`] normalise).
 
+mod axis_turn;
 pub mod load;
 mod reason;
 mod target;
@@ -15,8 +16,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use crate::nc::orientation::Angles;
-use nalgebra::UnitQuaternion;
+pub use axis_turn::AxisTurn;
 pub use reason::{OpaqueReason, Reason};
 use smallvec::SmallVec;
 pub use target::{FARTHEST_MM, Frame, JointTarget, RobTarget, TargetValue};
@@ -288,26 +288,6 @@ impl Modal {
         sensor_guided: Switch::Off,
         independent_axis: Switch::Off,
     };
-}
-
-/// Three words of orientation that run linearly, each on its own, as rotary axes do.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AxisTurn {
-    /// Their convention.
-    pub convention: Angles,
-    /// The words in effect at the start (°), whole turns included.
-    pub from_deg: [f64; 3],
-    /// Those at the end.
-    pub to_deg: [f64; 3],
-}
-
-impl AxisTurn {
-    /// The orientation at a share of the path.
-    pub fn at(&self, share: f64) -> UnitQuaternion<f64> {
-        self.convention.rotation(std::array::from_fn(|axis| {
-            self.from_deg[axis] + share * (self.to_deg[axis] - self.from_deg[axis])
-        }))
-    }
 }
 
 /// One motion instruction. More than twenty fields: whatever a motion of any language states.

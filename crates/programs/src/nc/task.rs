@@ -21,6 +21,7 @@ mod one_shot;
 mod paths;
 mod block;
 mod shift;
+mod turn;
 mod file_scan;
 mod prescan;
 mod tools;
