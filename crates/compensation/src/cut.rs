@@ -187,9 +187,7 @@ pub(crate) fn may_cut(motion: &Motion) -> bool {
         // Behind a jump, a call or a label a block without its own G0 or G1 may be either.
         || motion.kind == MotionKind::Unknown && motion.own_reason == Some(Reason::UnknownFlow);
     // A search motion ends, and stops, at its signal.
-    path && motion.own_reason != Some(Reason::Probe)
-        && !motion.instruction.contains("Search")
-        && !follows_position(motion)
+    path && motion.own_reason != Some(Reason::Probe) && !motion.is_search() && !follows_position(motion)
 }
 
 /// Whether a motion is counted from where the robot stands: behind a corrected motion it starts at the corrected place and keeps its shape.

@@ -399,6 +399,11 @@ impl Motion {
         self.to()?.value.ok()?.cartesian().copied()
     }
 
+    /// Whether it is a search of RAPID (SearchL, SearchC, SSearchL), which ends, and stops, at its signal.
+    pub fn is_search(&self) -> bool {
+        self.instruction.contains("Search")
+    }
+
     /// Why this motion cannot be rewritten: first the motion's own reason, then those of its targets. `None` if it
     /// can.
     pub fn reason(&self) -> Option<Reason> {

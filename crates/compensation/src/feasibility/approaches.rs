@@ -136,7 +136,8 @@ impl<'a> Starts<'a> {
     fn is_path(&self, index: u32) -> bool {
         let motion = &self.listing.motions[index as usize];
         let is_line = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
-        is_line && may_cut(motion) || searches_on_line(motion)
+        // A tilted search meets the part elsewhere.
+        is_line && (may_cut(motion) || motion.is_search() && !follows_position(motion))
     }
 
     /// The motions of a cut.
@@ -188,12 +189,6 @@ impl<'a> Starts<'a> {
             && way.norm() >= DRAWN_BACK_MM
             && way.dot(&back) >= STRAIGHT_BACK * way.norm()
     }
-}
-
-/// Whether the tool goes on a line until a signal (SearchL, SearchC): tilted, it meets the part elsewhere.
-fn searches_on_line(motion: &Motion) -> bool {
-    let is_line = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
-    is_line && motion.instruction.contains("Search") && !follows_position(motion)
 }
 
 /// Passes over a program in search of starts that are refused; what is left over, the next round of the planner finds.

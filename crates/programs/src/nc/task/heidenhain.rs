@@ -142,9 +142,10 @@ impl<'s> Interpreter<'_, 's> {
             b"TCH" => {
                 self.list_left(block, "TCH PROBE", Reason::Probe);
                 let number = words.get(2).copied().unwrap_or_default();
-                match measures_only(number) {
-                    true => self.invalidate_position(),
-                    false => self.invalidate_by_probing(),
+                if measures_only(number) {
+                    self.invalidate_position();
+                } else {
+                    self.invalidate_by_probing();
                 }
             }
             b"BEGIN" | b"END" => {
