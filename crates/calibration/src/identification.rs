@@ -11,6 +11,7 @@ pub mod network;
 pub mod solver;
 pub mod fit;
 pub mod start;
+pub(crate) mod parameter_table;
 mod sessions;
 pub(crate) mod misreading;
 pub(crate) mod rigid_motion_columns;

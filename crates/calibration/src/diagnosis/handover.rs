@@ -17,10 +17,11 @@ use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
 use crate::identification::fit::Fitted;
 use crate::identification::identify::{
     self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition,
-    parameter_table, with_sigma_in_region,
+    with_sigma_in_region,
 };
 use crate::identification::inflation::inflation_from_errors;
 use crate::identification::linearised_readings::widen_by_scale;
+use crate::identification::parameter_table::parameter_table;
 use crate::identification::unseen_target::unseen_target;
 use crate::identification::verdict::{CONVERGED, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};

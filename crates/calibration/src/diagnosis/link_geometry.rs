@@ -7,7 +7,7 @@ use super::finding::{Confidence, Finding, FoundParameter, Gain};
 use super::findings::FindingBuilder;
 use super::words;
 use crate::identification::fit::Fitted;
-use crate::identification::identify::parameter_table;
+use crate::identification::parameter_table::parameter_table;
 use crate::identification::tolerance::Tolerance;
 use crate::identification::verdict::is_implausible;
 use truegrind_arm::estimated::EstimatedParameter;
