@@ -1,13 +1,20 @@
-//! Program analysis, whatever the language: [`Lattice`], facts with a join; [`propagate`], the least facts that hold along the edges of a
-//! graph (side effects flow from callees to callers, states at entry from callers to callees); [`Transfer`], the transfer function of a
-//! language, taken over its statements. A language brings its syntax tree, its side effects and its transfer function: RAPID in
-//! `rapid/flow`, NC in `nc/task`.
+//! Program analysis, whatever the language: [`Lattice`], facts with a join, and their least fixpoint along the edges of a program. A
+//! language brings its syntax tree, its side effects and its transfer function: RAPID in `rapid/flow`, NC in `nc/task`.
 //!
-//! Method: monotone frameworks with a worklist in reverse post-order (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999,
-//! §2.4 and §6.1). Loops of RAPID need no fixpoint: what a loop changes is unknown at its head and after it, which holds for every number
-//! of iterations. NC text has jumps instead, and is read until its joins no longer change (`nc/task/paths`).
+//! - [`graph`]: where the edges are known beforehand, as those of calls are.
+//! - [`walk`]: over structured statements, whose loops need no fixpoint: what a loop changes is unknown at its head and after it, which
+//!   holds for every number of iterations.
+//! - [`passes`]: where edges are found only while the text is read, as the jumps of NC are.
+//!
+//! Method: monotone frameworks (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999, §2.4 and §6.1).
 
-use std::collections::BTreeSet;
+mod graph;
+mod passes;
+mod walk;
+
+pub(crate) use graph::{Edge, post_order, propagate};
+pub(crate) use passes::{Arrivals, read_until_stable};
+pub(crate) use walk::{Control, Nesting, Transfer};
 
 /// Facts that hold on several paths: an element of a join semi-lattice.
 pub(crate) trait Lattice: Clone {
@@ -22,220 +29,6 @@ impl<F: Lattice> Lattice for Option<F> {
             (Some(fact), Some(other)) => fact.join(other),
             (this @ None, other) => this.clone_from(other),
             (Some(_), None) => {}
-        }
-    }
-}
-
-/// An edge of a graph: from, to, and what happens to the facts along it.
-pub(crate) type Edge<E> = (u32, u32, E);
-
-/// The edges that leave a node; `edges` are sorted by where they begin.
-fn leaving<E>(edges: &[Edge<E>], node: u32) -> &[Edge<E>] {
-    let first = edges.partition_point(|edge| edge.0 < node);
-    &edges[first..first + edges[first..].partition_point(|edge| edge.0 == node)]
-}
-
-/// Post-order: each node after those to which its edges lead, except along cycles. `edges` are sorted by where they begin.
-pub(crate) fn post_order<E>(nodes: usize, edges: &[Edge<E>]) -> Vec<u32> {
-    let mut order = Vec::with_capacity(nodes);
-    let mut seen = vec![false; nodes];
-    let mut open = Vec::new();
-    for root in 0..nodes as u32 {
-        if !std::mem::replace(&mut seen[root as usize], true) {
-            open.push((root, leaving(edges, root)));
-        }
-        while let Some((node, rest)) = open.last_mut() {
-            if let Some(((_, to, _), others)) = rest.split_first() {
-                *rest = others;
-                if !std::mem::replace(&mut seen[*to as usize], true) {
-                    open.push((*to, leaving(edges, *to)));
-                }
-            } else {
-                order.push(*node);
-                open.pop();
-            }
-        }
-    }
-    order
-}
-
-/// Least fixpoint: `facts` grow until each holds what `arriving` makes, along every edge, of the facts where the edge begins. None
-/// can grow more than `height` times, which bounds the steps.
-pub(crate) fn propagate<F: Lattice + PartialEq, E>(
-    facts: &mut [F],
-    height: usize,
-    edges: &mut [Edge<E>],
-    arriving: impl Fn(&E, &F) -> F,
-) {
-    edges.sort_by_key(|edge| edge.0);
-    let mut order = post_order(facts.len(), edges);
-    order.reverse();
-    let mut rank = vec![0; order.len()];
-    (0..).zip(&order).for_each(|(at, &node)| rank[node as usize] = at);
-    let mut open: BTreeSet<u32> = (0..order.len() as u32).collect();
-    let mut steps = 0;
-    while let Some(at) = open.pop_first() {
-        steps += 1;
-        debug_assert!(steps <= order.len() * (1 + height), "a fact grew too often");
-        let node = order[at as usize];
-        for (_, to, along) in leaving(edges, node) {
-            let arriving = arriving(along, &facts[node as usize]);
-            let fact = &mut facts[*to as usize];
-            let before = fact.clone();
-            fact.join(&arriving);
-            if *fact != before {
-                open.insert(rank[*to as usize]);
-            }
-        }
-    }
-}
-
-/// What a node is for the flow of control.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Control {
-    /// One after another: its children.
-    Sequence,
-    /// No control flow of its own: [`Transfer::transfer`].
-    Simple,
-    /// A simple one that may be skipped.
-    Skippable,
-    /// A condition and what it guards.
-    Optional,
-    /// One of its branches.
-    Branches,
-    /// A branch; whether it is taken where no other is.
-    Branch {
-        /// ELSE, DEFAULT.
-        otherwise: bool,
-    },
-    /// Any number of times its children.
-    Loop,
-    /// Entered from anywhere in the routine, and never from the statement before it.
-    Handler,
-    /// Entered from the statement before it and from anywhere.
-    Label,
-    /// A condition or bound.
-    Expression,
-    /// Another routine.
-    Apart,
-}
-
-/// Control structures around a statement.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Nesting {
-    pub(crate) in_loop: bool,
-    pub(crate) conditional: bool,
-    /// Whether a condition guards this statement alone.
-    pub(crate) guarded: bool,
-}
-
-/// The transfer function of a language, over the nodes of a [`crate::tree::Tree`].
-pub(crate) trait Transfer {
-    /// The abstract state before a statement.
-    type State: Lattice;
-
-    /// The current state.
-    fn state(&mut self) -> &mut Self::State;
-    /// The number of nodes in a subtree.
-    fn size(&self, node: u32) -> u32;
-    /// What a node is.
-    fn control(&self, node: u32) -> Control;
-    /// The state after a simple statement.
-    fn transfer(&mut self, node: u32, nesting: Nesting);
-    /// Joins the state with those of every point of the routine.
-    fn join_any_point(&mut self);
-    /// The state after a condition or bound.
-    fn evaluate(&mut self, _node: u32) {}
-    /// At the head of a loop: what the loop changes is unknown.
-    fn enter_loop(&mut self, _node: u32) {}
-    /// Behind a loop that was entered with `before`.
-    fn leave_loop(&mut self, _node: u32, _before: &Self::State) {}
-    /// At the end of a handler.
-    fn end_handler(&mut self, _node: u32, _end: Self::State) {}
-    /// Whether control may pass all branches although one of them is for all other cases.
-    fn may_pass_branches(&self) -> bool {
-        false
-    }
-
-    /// Takes the state through the children of a node.
-    fn walk(&mut self, node: u32, nesting: Nesting) {
-        let (mut child, end) = (node + 1, node + self.size(node));
-        while child < end {
-            self.step(child, nesting);
-            child += self.size(child);
-        }
-    }
-
-    /// Takes the state through a node.
-    fn step(&mut self, node: u32, nesting: Nesting) {
-        let conditional = Nesting { conditional: true, guarded: false, ..nesting };
-        let guarded = Nesting { guarded: true, ..conditional };
-        match self.control(node) {
-            Control::Sequence => self.walk(node, nesting),
-            Control::Simple | Control::Branch { .. } => self.transfer(node, nesting),
-            kind @ (Control::Skippable | Control::Optional) => {
-                self.conditions(node);
-                let skipped = self.state().clone();
-                match kind {
-                    Control::Skippable => self.transfer(node, guarded),
-                    _ => self.walk(node, guarded),
-                }
-                self.state().join(&skipped);
-            }
-            Control::Branches => self.branches(node, conditional),
-            Control::Loop => {
-                let before = self.state().clone();
-                self.enter_loop(node);
-                self.walk(node, Nesting { in_loop: true, guarded: false, ..nesting });
-                self.state().join(&before);
-                self.leave_loop(node, &before);
-            }
-            Control::Handler => {
-                let before = self.state().clone();
-                self.join_any_point();
-                self.walk(node, conditional);
-                let end = std::mem::replace(self.state(), before);
-                self.end_handler(node, end);
-            }
-            Control::Label => self.join_any_point(),
-            Control::Expression => self.evaluate(node),
-            Control::Apart => {}
-        }
-    }
-
-    /// The conditions of a statement or branch.
-    fn conditions(&mut self, node: u32) {
-        let (mut child, end) = (node + 1, node + self.size(node));
-        while child < end {
-            if self.control(child) == Control::Expression {
-                self.evaluate(child);
-            }
-            child += self.size(child);
-        }
-    }
-
-    /// Branches: a condition is evaluated before its branch and all that follow.
-    fn branches(&mut self, node: u32, nesting: Nesting) {
-        let (mut joined, mut complete) = (None, false);
-        let (mut child, end) = (node + 1, node + self.size(node));
-        while child < end {
-            if let Control::Branch { otherwise } = self.control(child) {
-                self.conditions(child);
-                complete |= otherwise;
-                let before = self.state().clone();
-                self.walk(child, nesting);
-                let after = std::mem::replace(self.state(), before);
-                joined.join(&Some(after));
-            } else {
-                self.evaluate(child);
-            }
-            child += self.size(child);
-        }
-        if let Some(joined) = joined {
-            let passed = std::mem::replace(self.state(), joined);
-            if !complete || self.may_pass_branches() {
-                self.state().join(&passed);
-            }
         }
     }
 }

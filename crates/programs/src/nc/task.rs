@@ -175,6 +175,8 @@ pub(super) struct Interpreter<'t, 's> {
     file_effects: Option<FileEffects>,
     /// What arrives at the places to which control comes from elsewhere; `None` where the text does not determine it.
     paths: Option<Box<Paths>>,
+    /// Whether labels are also reached by jumps: the return of any may then end any other (Heidenhain).
+    returns_are_common: bool,
     /// How many files are read together.
     files: usize,
     pass: Pass,
@@ -290,6 +292,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             state,
             file_effects: None,
             paths: None,
+            returns_are_common: false,
             files: 1,
             pass: Pass::default(),
             assigned_variables: HashSet::new(),

@@ -1,10 +1,8 @@
 //! The places of a file to which control comes from elsewhere, and the states that arrive there.
 
-use std::collections::{HashMap, HashSet};
-
 use super::super::expression::Variable;
 use super::super::modal_state::ModalState;
-use crate::dataflow::Lattice;
+use crate::dataflow::Arrivals;
 
 /// A place to which control comes from elsewhere.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -23,50 +21,8 @@ pub(super) enum Site {
     Behind(u32),
 }
 
-/// The states that arrive at each place of a file, from all passes so far.
-#[derive(Debug, Default)]
-pub(super) struct Paths {
-    pub(super) arrived: HashMap<Site, ModalState>,
-    /// Those of the pass before, where this one starts anew.
-    pub(super) before: HashMap<Site, ModalState>,
-    /// Whether calls are guessed to change nothing where their end has not been reached, and whether one has been.
-    pub(super) guesses: bool,
-    pub(super) has_guessed: bool,
-    /// Where something leads, and which places there are.
-    pub(super) targets: HashSet<Site>,
-    pub(super) places: HashSet<Site>,
-    /// Whether this pass has added anything.
-    pub(super) has_grown: bool,
-    /// Whether something may lead anywhere.
-    pub(super) is_open: bool,
-    /// Whether labels are also reached by jumps: the return of any may then end any other (Heidenhain).
-    pub(super) returns_are_common: bool,
-    /// Whether code that no path reaches is taken to run.
-    pub(super) is_all_reached: bool,
-    /// Whether this pass has found code that no path reaches.
-    pub(super) has_unreached: bool,
-}
-
-impl Paths {
-    pub(super) fn add(&mut self, site: &Site, state: &ModalState) {
-        match self.arrived.get_mut(site) {
-            Some(all) => {
-                let before = all.clone();
-                all.join(state);
-                self.has_grown |= *all != before;
-            }
-            None => {
-                self.has_grown = true;
-                self.arrived.insert(site.clone(), state.clone());
-            }
-        }
-    }
-
-    /// Whether a jump or call may lead to a place that the text does not show.
-    pub(super) fn leads_elsewhere(&self) -> bool {
-        self.is_open || self.targets.iter().any(|site| !self.places.contains(site))
-    }
-}
+/// The states that arrive at each place of a file.
+pub(super) type Paths = Arrivals<Site, ModalState>;
 
 /// A loop or branches that have not ended yet.
 #[derive(Debug)]

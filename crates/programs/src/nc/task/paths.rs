@@ -1,14 +1,7 @@
 //! What holds where control comes from elsewhere: at labels, at the heads and ends of loops and branches, in subprograms and behind
 //! their calls. The states of all paths that lead to such a place are joined there.
-//!
-//! Method: a pass over the text adds to each place what leads there; passes repeat until none adds anything. What they find then holds on
-//! every path, whatever they began with and whether or not the transfer function is monotone. They begin with the guess that calls change
-//! nothing, since otherwise each of many calls in a row would take a pass; what followed from wrong guesses is then dropped. Code that no path
-//! reaches contributes nothing at first; once nothing changes, it is taken to run in the state of
-//! [`Interpreter::join_unseen_predecessors`], in case it is reached after all. A file with a jump or call that may lead anywhere is read by
-//! that rule alone.
-
-use std::collections::HashMap;
+//! ([`read_until_stable`]). Code that no path reaches is taken to run in the state of [`Interpreter::join_unseen_predecessors`]. A file
+//! with a jump or call that may lead anywhere is read by that rule alone.
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Variable, numbered};
@@ -17,66 +10,30 @@ use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
 use super::arrivals::{Site, Structure, StructureKind, is_label, label};
 use super::{Block, Interpreter, Lengths, Pass, StateEvent};
-use crate::dataflow::Lattice;
+use crate::dataflow::{Lattice, read_until_stable};
 use crate::motion::Reason;
-
-/// How many passes a file gets: each level of calls and loops takes one.
-const PASSES: usize = 9;
-/// How many of them, behind the first, start anew from what the one before has found, if that rested on a guess.
-const FRESH: usize = 2;
 
 impl Interpreter<'_, '_> {
     /// Reads a file along its paths. False where they do not follow from the text.
     pub(super) fn interpret_paths(&mut self, lengths: &Lengths, start: &ModalState) -> bool {
-        if self.scan.computed_jump {
-            return false;
-        }
-        self.paths = Some(Box::default());
-        let mut fresh = 0..FRESH;
-        for pass in 0..PASSES {
-            let is_fresh = self.prepare_pass(pass, &mut fresh);
-            self.truncate_to(lengths);
-            self.state = start.clone();
-            self.pass = Pass::default();
-            self.interpret_file();
-            let is_open = !self.pass.structures.is_empty();
-            let Some(paths) = self.paths.as_mut() else { break };
-            if is_open || paths.leads_elsewhere() {
-                break;
-            }
-            if is_fresh {
-                if paths.arrived == paths.before {
-                    fresh = 0..0;
-                }
-                continue;
-            }
-            let has_unreached = std::mem::take(&mut paths.has_unreached);
-            if std::mem::take(&mut paths.has_grown) {
-                continue;
-            }
-            if paths.is_all_reached || !has_unreached {
-                return true;
-            }
-            paths.is_all_reached = true;
-        }
-        self.paths = None;
-        false
-    }
-
-    /// Whether a pass starts anew from what the one before has found.
-    fn prepare_pass(&mut self, pass: usize, fresh: &mut std::ops::Range<usize>) -> bool {
-        let Some(paths) = &mut self.paths else { return false };
-        paths.guesses = pass == 0;
-        let is_fresh = pass > 0 && paths.has_guessed && fresh.next().is_some();
-        paths.before = if is_fresh { std::mem::take(&mut paths.arrived) } else { HashMap::new() };
-        (paths.has_grown, paths.has_unreached) = (false, false);
-        is_fresh
+        !self.scan.computed_jump
+            && read_until_stable(
+                self,
+                |interpreter| &mut interpreter.paths,
+                |interpreter| {
+                    interpreter.truncate_to(lengths);
+                    interpreter.state = start.clone();
+                    interpreter.pass = Pass::default();
+                    interpreter.interpret_file();
+                    interpreter.pass.structures.is_empty()
+                },
+            )
     }
 
     /// Control may lead from here to a place that the text does not show.
     pub(super) fn leads_anywhere(&mut self) {
         if let Some(paths) = &mut self.paths {
-            paths.is_open = true;
+            paths.lead_anywhere();
         }
     }
 
@@ -87,7 +44,7 @@ impl Interpreter<'_, '_> {
             paths.add(&site, &at_join(&self.state));
         }
         if !matches!(site, Site::Return(_)) {
-            paths.targets.insert(site);
+            paths.require(site);
         }
     }
 
@@ -114,9 +71,8 @@ impl Interpreter<'_, '_> {
     /// Takes the state that arrives at a place, joined with that of another path.
     fn settle(&mut self, site: &Site, other: Option<ModalState>) {
         let Some(paths) = &mut self.paths else { return self.join_unseen_predecessors() };
-        let mut arriving = paths.arrived.get(site).or_else(|| paths.before.get(site)).cloned();
+        let mut arriving = paths.at(site);
         arriving.join(&other);
-        paths.places.insert(site.clone());
         let Some(state) = arriving else {
             self.pass.unreached = true;
             return self.join_unseen_predecessors();
@@ -133,15 +89,14 @@ impl Interpreter<'_, '_> {
 
     /// Whether something leads to a place.
     pub(super) fn is_target(&self, site: &Site) -> bool {
-        self.paths.as_ref().is_some_and(|paths| paths.targets.contains(site))
+        self.paths.as_ref().is_some_and(|paths| paths.is_required(site))
     }
 
     /// At the end of a block: code that no path reaches.
     pub(super) fn note_unreached(&mut self, block: &Block<'_>) {
         let Some(paths) = &mut self.paths else { return };
         if self.pass.unreached && !self.pass.program_ended && !block.words.is_empty() {
-            paths.has_unreached = true;
-            self.pass.unreached = !paths.is_all_reached;
+            self.pass.unreached = !paths.find_unreached();
         }
     }
 
@@ -228,15 +183,14 @@ impl Interpreter<'_, '_> {
     }
 
     fn returns_are_common(&mut self) {
-        if let Some(paths) = &mut self.paths {
-            paths.has_grown |= !paths.returns_are_common;
-            paths.returns_are_common = true;
+        if let Some(paths) = self.paths.as_mut().filter(|_| !self.returns_are_common) {
+            self.returns_are_common = true;
+            paths.ask_for_pass();
         }
     }
 
     fn return_of(&self, name: &Variable) -> Site {
-        let is_common = self.paths.as_ref().is_some_and(|paths| paths.returns_are_common);
-        Site::Return(if is_common { Variable::new() } else { name.clone() })
+        Site::Return(if self.returns_are_common { Variable::new() } else { name.clone() })
     }
 
     /// Control may return to the callers of these programs or labels. Their variables may be local.
@@ -321,12 +275,8 @@ impl Interpreter<'_, '_> {
 
     /// The state behind a call whose end no pass has reached yet.
     fn guess(&mut self, site: &Site) -> Option<ModalState> {
-        let paths = self.paths.as_mut()?;
-        if !paths.guesses || self.pass.unreached || paths.arrived.contains_key(site) {
-            return None;
-        }
-        paths.has_guessed = true;
-        Some(at_join(&self.state))
+        let guesses = !self.pass.unreached && self.paths.as_mut()?.guess(site);
+        guesses.then(|| at_join(&self.state))
     }
 
     /// Whether a call may run its program several times in a row (M98 P1 L3, P30001).
@@ -344,9 +294,7 @@ impl Interpreter<'_, '_> {
         // What is repeated ends at ENDLABEL, and not here.
         let end = Site::Label(b"ENDLABEL".to_vec());
         let is_before = |site: &Site| {
-            self.paths
-                .as_ref()
-                .is_some_and(|paths| paths.places.contains(site) && !paths.places.contains(&end))
+            self.paths.as_ref().is_some_and(|paths| paths.is_read(site) && !paths.is_read(&end))
         };
         let is_last = words.all(|word| word.address() == Some(b'P'));
         match site.filter(|site| is_last && is_before(site)) {
