@@ -135,6 +135,7 @@ pub(crate) fn unchecked_notes(
         ));
     }
     out.extend(outside_calls_note(listing));
+    out.extend(position_decisions_note(listing));
     out.extend(open_control_note(listing));
     out.extend(unstated_length_note(listing));
     let curve = |m: &u32| {
@@ -186,6 +187,15 @@ fn unstated_length_note(listing: &Listing) -> Option<String> {
     Some(format!(
         "no G43: LinuxCNC does not take over the length of a tool by T and M6, so the tool tip is where the tool is said to have it only if G43 \
          is still active from before. State G43 behind M6, or G49 where X Y Z are not those of the tip (before {lines})"
+    ))
+}
+
+/// Decisions by the position that the robot reads, at the end of motions that are corrected.
+fn position_decisions_note(listing: &Listing) -> Option<String> {
+    let lines = numbered(&listing.files, listing.position_decisions.iter().copied())?;
+    Some(format!(
+        "the program decides by the position that the robot reads (CRobT, CPos, CJointT). Behind a corrected motion that is the corrected position: \
+         see that each tolerance there is wider than the largest correction ({lines})"
     ))
 }
 
