@@ -66,6 +66,8 @@ pub(super) enum ModalGroup {
     RotaryOffset,
     /// FUNCTION TCPM REFPNT: 1 where the programmed point is not the tip.
     ReferencePoint,
+    /// PTP, CP: 1 where the joints lead to the end, on a path that is no line.
+    PointToPoint,
     // Groups that matter for some motions only.
     /// G90.1, G91.1: absolute or incremental arc centres.
     ArcCentreMode,
