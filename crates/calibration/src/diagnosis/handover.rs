@@ -183,11 +183,19 @@ impl Handover<'_> {
             parameters: &parameter_table(fitted, nominal),
             benefit: benefit.as_ref(),
             sensor: rows.sensor,
-            unseen_target: unseen_target(handed, rows, &estimated),
+            unseen_target: unseen_target(handed, &self.kept_rows(), &estimated),
             stages: self.stages(arm.errors),
             options,
         });
         HandedOver { estimated, benefit: benefit.ok() }
+    }
+
+    /// The rows that were not set aside.
+    fn kept_rows(&self) -> Dataset {
+        let rows = &self.search.context.subject.observed.dataset;
+        let kept: Vec<usize> =
+            (0..rows.rows.len()).filter(|row| !self.search.set_aside.contains(row)).collect();
+        rows.subset(&kept)
     }
 
     /// A fit with the stated uncertainty of the sensor's scale.
