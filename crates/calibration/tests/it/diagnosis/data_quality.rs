@@ -59,6 +59,24 @@ fn one_wild_reading_hides_no_cause() {
     assert_eq!(names(&[gear, Hidden::Outliers { list: vec![50], mm: 2000.0 }]), alone);
 }
 
+/// What the other parameters absorb of a gear's error in a row whose reading is metres off is no size of the gear's error; nor do such readings
+/// say how the poses turn the flange.
+#[test]
+fn wild_readings_change_neither_the_size_of_a_finding_nor_what_is_said_of_the_poses() {
+    let gear = Hidden::Gear { joint: 3, order: 1.0, peak_rad: 0.0015, phase: 0.4 };
+    let told = |hidden: &[Hidden]| {
+        let found = diagnosed(&run(&arm(), hidden, &setup(200, 11)).dataset, &arm());
+        let worth = finding(&found, "gear-eccentricity").and_then(|gear| gear.worth_mm).unwrap();
+        let reasons = found.estimated.verdict.reasons;
+        assert!(!reasons.iter().any(|reason| reason.contains("where the target sits")), "{reasons:?}");
+        worth
+    };
+    let alone = told(std::slice::from_ref(&gear));
+    let list = vec![5, 30, 55, 80, 105, 130, 155];
+    let beside = told(&[gear, Hidden::Outliers { list, mm: 3000.0 }]);
+    assert!((beside / alone - 1.0).abs() < 0.1, "{beside} mm beside wild readings, {alone} mm without them");
+}
+
 #[test]
 fn rounded_angles_are_told_behind_a_larger_fault() {
     let hidden = [Hidden::Frame { from: 90, to: 199, mm: [4.0, -3.0, 1.0] }];
