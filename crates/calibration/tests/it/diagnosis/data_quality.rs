@@ -1,5 +1,6 @@
 //! What is wrong with the rows or the data sheet is a finding, and hides no cause.
 
+use nalgebra::Vector3;
 use truegrind_arm::estimated::Judgement;
 use truegrind_arm::model::Model;
 use truegrind_arm::robots;
@@ -7,7 +8,7 @@ use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
 use truegrind_calibration::diagnosis::transfer::new_rows;
 use truegrind_calibration::identification::tolerance::Tolerance;
-use truegrind_calibration::measurement::dataset::{Dataset, Row, Sensor};
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 
 use super::scenarios::frames;
 use super::simulator::{Hidden, Log, Setup, run};
@@ -75,6 +76,46 @@ fn wild_readings_change_neither_the_size_of_a_finding_nor_what_is_said_of_the_po
     let list = vec![5, 30, 55, 80, 105, 130, 155];
     let beside = told(&[gear, Hidden::Outliers { list, mm: 3000.0 }]);
     assert!((beside / alone - 1.0).abs() < 0.1, "{beside} mm beside wild readings, {alone} mm without them");
+}
+
+/// The rows with the readings that `of` makes of them.
+fn with_readings(dataset: &Dataset, of: impl Fn(usize) -> Vector3<f64>) -> Dataset {
+    let mut out = dataset.clone();
+    for (index, row) in out.rows.iter_mut().enumerate() {
+        row.reading = Reading::Position(of(index));
+    }
+    out
+}
+
+fn refused(dataset: &Dataset) -> Option<String> {
+    let frames = frames(dataset, &arm());
+    let found = diagnose(dataset, "abb-irb-120", &arm(), &frames, &Options::default(), &|_| ());
+    found.err().map(|error| error.to_string())
+}
+
+/// One reading is missing, so that each later row has that of the next: most rows fit all the same, but no cause is to be found in the others.
+#[test]
+fn a_missing_reading_is_told_and_no_cause_is_searched() {
+    let rows = run(&arm(), &[], &setup(132, 61)).dataset;
+    for first in [60, 85] {
+        let place = |row: usize| rows.rows[row].reading.place_mm();
+        let slipped = with_readings(&rows, |row| place(if row < first { row } else { (row + 1).min(131) }));
+        let told = refused(&slipped).expect("rows that are refused");
+        assert!(told.contains("each reading belongs to the row after it"), "{first}: {told}");
+    }
+}
+
+/// Half of the rows are a mirror image, in a station of their own: whatever is set aside, the others are no diagnosis.
+#[test]
+fn a_mirrored_station_is_refused() {
+    let rows = run(&arm(), &[], &setup(132, 62)).dataset;
+    let mut mirrored = with_readings(&rows, |row| {
+        let place = rows.rows[row].reading.place_mm();
+        if row < 66 { place } else { Vector3::new(place.x, -place.y, place.z) }
+    });
+    mirrored.rows.iter_mut().skip(66).for_each(|row| row.anchor = 1);
+    let told = refused(&mirrored).expect("rows that are refused");
+    assert!(told.contains("more than any arm"), "{told}");
 }
 
 #[test]
