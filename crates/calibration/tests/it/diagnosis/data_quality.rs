@@ -5,7 +5,7 @@ use truegrind_arm::estimated::Judgement;
 use truegrind_arm::model::Model;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
+use truegrind_calibration::diagnosis::finding::{Alternative, Confidence, Finding};
 use truegrind_calibration::diagnosis::transfer::new_rows;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
@@ -254,4 +254,20 @@ fn copies_test_nothing() {
     let fresh = all.subset(&(60..100).collect::<Vec<usize>>());
     assert_eq!(new_rows(&own, &fresh, &mut notes).unwrap().rows.len(), 40);
     assert!(notes.is_empty());
+}
+
+/// A tracker that moved while it stood in its second place: each place has a frame of its own, so that a shift of its first rows and one of
+/// its later rows are the same.
+#[test]
+fn a_station_that_moved_is_one_event() {
+    for (from, to) in [(130, 199), (100, 129)] {
+        let hidden = [Hidden::Frame { from, to, mm: [0.3, -0.2, 0.1] }];
+        let mut dataset = run(&arm(), &hidden, &setup(200, 71)).dataset;
+        dataset.rows.iter_mut().skip(100).for_each(|row| row.anchor = 1);
+        let found = diagnosed(&dataset, &arm());
+        let shift = finding(&found, "sensor-frame-shift").unwrap();
+        assert_eq!((shift.rows, shift.confidence), (Some([130, 199]), Confidence::Identified), "{shift:?}");
+        let level = |other: &&Alternative| other.effect == shift.effect && other.beaten_by < 100.0;
+        assert_eq!(shift.alternatives.iter().find(level), None, "{shift:?}");
+    }
 }
