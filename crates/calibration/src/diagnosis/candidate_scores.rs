@@ -154,10 +154,13 @@ fn shifts(catalogue: &Catalogue, subject: &Subject<'_>, fit: &Extended, design: 
     });
     let known = known.map(Arc::new);
     let shifts: Vec<&Arc<Candidate>> = catalogue.shifts.iter().chain(&known).collect();
+    let dataset = &subject.observed.dataset;
+    let stations: Vec<usize> = (0..dataset.rows.len()).map(|row| dataset.station_of(row)).collect();
     shifts
         .into_par_iter()
         .map(|candidate| {
             let strip = ShiftScan::of(design, &candidate.columns(design), &candidate.cause.sizes());
+            let strip = strip.map(|strip| strip.of_stations(&stations));
             Shift { always: Arc::clone(candidate), strip }
         })
         .collect()

@@ -434,7 +434,9 @@ impl<'a> Half<'a> {
         let Some(strip) = ShiftScan::of(design, &everywhere, &tried.candidate.cause.sizes()) else {
             return true;
         };
-        let best = strip.scan(design, 1);
+        let rows = &self.confirming.subject.observed.dataset;
+        let stations: Vec<usize> = self.rows.iter().map(|&i| rows.station_of(i)).collect();
+        let best = strip.of_stations(&stations).scan(design, 1);
         let inside = |i: usize| (from..=to).contains(&self.numbers[i]);
         best.first().is_some_and(|best| {
             let mine = (0..self.numbers.len()).filter(|&i| inside(i)).count();

@@ -1,4 +1,8 @@
 //! Contributions of causes to the readings (mm RMS): total, and unique beyond everything else in the model.
+//!
+//! Rows that are gross outliers do not count. The fit hardly weighs them, so that no effect is wrong by their readings; but what the other
+//! parameters would absorb of an effect is taken from their derivatives there, and those follow the reading: where it is metres off, the
+//! turn of a sensor frame by a hundredth of a degree is a millimetre.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -7,6 +11,7 @@ use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::design::{FullDesign, Linear};
 use super::extension::{Extended, Subject};
+use super::residual_tests;
 
 /// Contributions of the causes of a fit.
 pub struct Contributions<'a> {
@@ -14,6 +19,8 @@ pub struct Contributions<'a> {
     whole: &'a FullDesign,
     /// Whitened columns of each cause times its estimate.
     effects: Vec<DVector<f64>>,
+    /// The observations that count.
+    counted: Vec<bool>,
     /// [`Contributions::unique_rms_mm`] of each cause alone (mm).
     unique: Vec<f64>,
 }
@@ -25,7 +32,9 @@ impl<'a> Contributions<'a> {
             Candidate::of(cause, subject).columns(&whole.design) * DVector::from_vec(cause.values())
         };
         let effects = fit.causes.par_iter().map(effect).collect();
-        let mut out = Self { fit, whole, effects, unique: Vec::new() };
+        let mut counted = vec![true; whole.design.observations];
+        residual_tests::outliers(fit).iter().for_each(|(row, _)| counted[*row] = false);
+        let mut out = Self { fit, whole, effects, counted, unique: Vec::new() };
         out.unique = (0..fit.causes.len()).into_par_iter().map(|k| out.unique_of(&[k])).collect();
         out
     }
@@ -38,16 +47,15 @@ impl<'a> Contributions<'a> {
     /// How far `causes` together move the readings from where they are in the mean (mm RMS over the observations): what a constant shift
     /// of the sensor is, is no movement.
     pub fn movement_rms_mm(&self, causes: &[usize]) -> f64 {
-        let mm = &self.whole.design.slopes.mm;
-        let moved: Vec<f64> = self.sum(causes).iter().zip(mm).map(|(v, mm)| v * mm).collect();
-        let observations = self.whole.design.observations.max(1);
-        let per = (moved.len() / observations).max(1);
+        let moved = self.counted_mm(&self.sum(causes));
+        let observations = moved.len().max(1) as f64;
         let square = |axis: usize| {
-            let along = || moved.iter().skip(axis).step_by(per);
-            let mean = along().sum::<f64>() / observations as f64;
+            let along = || moved.iter().map(|of_row| of_row[axis]);
+            let mean = along().sum::<f64>() / observations;
             along().map(|v| (v - mean).powi(2)).sum::<f64>()
         };
-        ((0..per).map(square).sum::<f64>() / observations as f64).sqrt()
+        let per = moved.first().map_or(0, Vec::len);
+        ((0..per).map(square).sum::<f64>() / observations).sqrt()
     }
 
     /// Unique contribution of `causes` together (mm RMS over the observations): the part that links, frames and the other causes
@@ -84,9 +92,17 @@ impl<'a> Contributions<'a> {
         causes.iter().fold(DVector::zeros(rows), |sum, &k| sum + &self.effects[k])
     }
 
-    fn in_mm(&self, effect: &DVector<f64>) -> f64 {
+    /// A whitened effect in mm, for each observation that counts.
+    fn counted_mm(&self, effect: &DVector<f64>) -> Vec<Vec<f64>> {
         let mm = &self.whole.design.slopes.mm;
-        let square: f64 = effect.iter().zip(mm).map(|(v, mm)| (v * mm).powi(2)).sum();
-        (square / self.whole.design.observations.max(1) as f64).sqrt()
+        let per = self.whole.design.per;
+        let counted = (0..self.counted.len()).filter(|row| self.counted[*row]);
+        counted.map(|row| (row * per..(row + 1) * per).map(|k| effect[k] * mm[k]).collect()).collect()
+    }
+
+    fn in_mm(&self, effect: &DVector<f64>) -> f64 {
+        let of_rows = self.counted_mm(effect);
+        let square: f64 = of_rows.iter().flatten().map(|v| v * v).sum();
+        (square / of_rows.len().max(1) as f64).sqrt()
     }
 }

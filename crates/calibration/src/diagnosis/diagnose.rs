@@ -6,7 +6,7 @@ use super::data_quality::single_angles;
 use super::decision;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
-use super::handover::{HandedOver, Handover};
+use super::handover::{HandedOver, Handover, too_many_aside};
 use super::merged;
 pub use super::options::Options;
 use super::picture::Picture;
@@ -20,7 +20,7 @@ use crate::identification::benefit::Benefit;
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{
-    Observations, WRONG_ORIENTATION_RAD, frame_parameters, median_orientation_error,
+    OUTLIER_SHARE, Observations, WRONG_ORIENTATION_RAD, frame_parameters, median_orientation_error,
 };
 use crate::identification::misreading;
 use crate::identification::start::count_distinct_poses;
@@ -31,6 +31,7 @@ use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::{Estimated, StageErrors};
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::arm_parameters;
+use truegrind_math::statistics::ErrorSummary;
 
 /// A diagnosis with its fits.
 #[derive(Debug, Clone)]
@@ -82,6 +83,7 @@ pub fn diagnose(
     let context = SearchContext { dataset, prepared: &prepared, subject, searched, options, progress };
     let most = if needed.is_some() { 0 } else { options.selection.most };
     let mut search = Search::run(&context, registered, most);
+    refuse_other_rows(&search, robot)?;
     search.drop_unvalidated_causes();
     progress("stability selection in halves of the rows");
     let mut confirmed = search.confirm();
@@ -139,16 +141,45 @@ fn refuse_other_arm(
     subject: &Subject<'_>,
 ) -> Result<(), DiagnoseError> {
     let (file, robot) = (dataset.file.clone(), robot.to_owned());
-    let rmse_mm = residual_tests::median_error_mm(registered);
-    if !(rmse_mm < WRONG_ARM_MM) {
+    let errors = registered.problem.errors_mm(&registered.x);
+    let median_mm = residual_tests::median_error_mm(registered);
+    if !(median_mm < WRONG_ARM_MM) {
         let explanation = misreading::explanation(dataset, subject.nominal);
-        return Err(DiagnoseError::WrongArm { file, robot, rmse_mm, explanation });
+        return Err(DiagnoseError::WrongArm { file, robot, rmse_mm: median_mm, explanation });
+    }
+    // Most rows may fit and a good part be of other poses: where that is more than `identify` sets aside, and something explains it, it is no
+    // cause to search for.
+    let strange = errors.iter().filter(|error| !(error.abs() < WRONG_ARM_MM)).count();
+    if strange as f64 > OUTLIER_SHARE * errors.len() as f64
+        && let Some(explanation) = misreading::explanation(dataset, subject.nominal)
+    {
+        let rmse_mm = ErrorSummary::of(errors).rmse;
+        return Err(DiagnoseError::WrongArm { file, robot, rmse_mm, explanation: Some(explanation) });
     }
     let turned = median_orientation_error(subject.observed, &registered.model, &registered.frames);
     match turned.filter(|rad| *rad > WRONG_ORIENTATION_RAD) {
         Some(rad) => Err(DiagnoseError::WrongOrientation { file, robot, deg: rad.to_degrees() }),
         None => Ok(()),
     }
+}
+
+/// Refuses rows of which no search made one arm's: the error that all causes leave is none that an arm has, or so many rows are set aside that
+/// are off by so much. What fits the others is then chance, or another set-up than that of the rest.
+fn refuse_other_rows(search: &Search<'_>, robot: &str) -> Result<(), DiagnoseError> {
+    let dataset = search.context.dataset;
+    let errors = search.extended.problem.errors_mm(&search.extended.x);
+    let of_aside = ErrorSummary::of(search.set_aside.iter().map(|&row| errors[row]));
+    let left_mm = search.stages[2].fitted.rmse;
+    let is_of_another = too_many_aside(search.set_aside.len(), errors.len()) && of_aside.rmse > WRONG_ARM_MM;
+    if left_mm < WRONG_ARM_MM && !is_of_another {
+        return Ok(());
+    }
+    Err(DiagnoseError::WrongArm {
+        file: dataset.file.clone(),
+        robot: robot.to_owned(),
+        rmse_mm: ErrorSummary::of(errors).rmse,
+        explanation: misreading::explanation(dataset, search.context.subject.nominal),
+    })
 }
 
 /// Says that there are too few poses.

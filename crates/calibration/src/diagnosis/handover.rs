@@ -183,11 +183,20 @@ impl Handover<'_> {
             parameters: &parameter_table(fitted, nominal),
             benefit: benefit.as_ref(),
             sensor: rows.sensor,
-            unseen_target: unseen_target(handed, rows, &estimated),
+            unseen_target: unseen_target(handed, &self.kept_rows(), &estimated),
             stages: self.stages(arm.errors),
+            set_aside: (self.search.set_aside.len(), rows.rows.len()),
             options,
         });
         HandedOver { estimated, benefit: benefit.ok() }
+    }
+
+    /// The rows that were not set aside.
+    fn kept_rows(&self) -> Dataset {
+        let rows = &self.search.context.subject.observed.dataset;
+        let kept: Vec<usize> =
+            (0..rows.rows.len()).filter(|row| !self.search.set_aside.contains(row)).collect();
+        rows.subset(&kept)
     }
 
     /// A fit with the stated uncertainty of the sensor's scale.
@@ -364,10 +373,17 @@ struct Judged<'a> {
     unseen_target: Option<String>,
     /// Errors of the data sheet, of geometry, and of the fit.
     stages: [StageError; 3],
+    /// How many rows were set aside, of how many.
+    set_aside: (usize, usize),
     options: &'a Options,
 }
 
-/// The verdict of an identification, plus: findings must not raise the held-out error of geometry.
+/// Whether so many rows were set aside (a third) that the others need not be the arm's.
+pub(super) fn too_many_aside(aside: usize, rows: usize) -> bool {
+    3 * aside >= rows
+}
+
+/// The verdict of an identification, plus: a third of the rows must not be set aside, and findings must not raise the held-out error of geometry.
 fn judge(case: &Judged<'_>) -> Verdict {
     let mut verdict = VerdictBuilder::default();
     let stages = &case.stages;
@@ -380,6 +396,13 @@ fn judge(case: &Judged<'_>) -> Verdict {
         verdict.fail(format!(
             "the held-out error is {:.3} mm with the findings, but {:.3} mm with geometry alone",
             stages[2].random.rmse, stages[1].random.rmse
+        ));
+    }
+    let (aside, rows) = case.set_aside;
+    if too_many_aside(aside, rows) {
+        verdict.fail(format!(
+            "{aside} of {rows} rows were set aside as outliers: what fits the others need not be the arm. Check that the sensor stayed where it \
+             was (a column station names its places), and that each reading belongs to the joint angles beside it"
         ));
     }
     verdict.check_links(case.parameters, &case.options.arm_tolerance, LINK_Z);

@@ -3,7 +3,8 @@
 //! With prefix sums of gradient, information and Q-products over the observations, the evidence of any interval takes p k²
 //! operations, so thousands of intervals are tried: a coarse grid of starts and ends, then the best ones refined row by
 //! row. The Q-products are summed once for a fit; a model without some parameters subtracts d directions. An interval from the
-//! first row is equivalent to its complement, which is reported instead: the change happened at its first row. Source:
+//! first row is equivalent to its complement, which is reported instead: the change happened at its first row. Each station of a tracker
+//! has a frame of its own, so that the same holds of a shift of the sensor from the first row of any station. Source:
 //! likelihood-ratio scan of circular binary segmentation, Olshen et al. 2004, with nuisance parameters projected off.
 
 use std::borrow::Cow;
@@ -78,6 +79,8 @@ pub struct ShiftScan {
     k: usize,
     /// Columns in units of the sizes.
     scaled: DMatrix<f64>,
+    /// The observations of each station, one after the other; all where there is one, or where they alternate.
+    stations: Vec<Range<usize>>,
     /// Observations at which an interval may begin on the coarse grid, and n.
     cuts: Vec<usize>,
     stride: usize,
@@ -248,7 +251,22 @@ impl ShiftScan {
         let shared = sums_at(&cuts, &scaled, &whole.basis, per);
         let products = gram(&shared);
         let square_at_cuts = by_entry(k, cuts.len(), |cut, a, b| square[(cuts[cut] * k + a) * k + b]);
-        Some(Self { n, k, scaled, cuts, stride, shared, products, square, square_at_cuts })
+        let stations = std::iter::once(0..n).collect();
+        Some(Self { n, k, stations, scaled, cuts, stride, shared, products, square, square_at_cuts })
+    }
+
+    /// The same for observations of several stations, one for each observation.
+    pub fn of_stations(self, station_of: &[usize]) -> Self {
+        let mut stations: Vec<Range<usize>> = Vec::new();
+        for run in station_of.chunk_by(|a, b| a == b) {
+            let from = stations.last().map_or(0, |before| before.end);
+            stations.push(from..from + run.len());
+        }
+        let mut named = station_of.to_vec();
+        named.sort_unstable();
+        named.dedup();
+        // Where stations alternate, a shift is none of a station.
+        if named.len() == stations.len() { Self { stations, ..self } } else { self }
     }
 
     /// The best intervals, best first: at most `count`, none of which shares most of its rows with a better one. `design` is
@@ -285,7 +303,7 @@ impl ShiftScan {
             let Some(next) = next.copied() else { break };
             last = Some(next);
             let next = if next.evidence > REFINED_EVIDENCE { refined(&sums, next) } else { next };
-            if !best.contains(&next) {
+            if !best.iter().any(|b| (b.from, b.to) == (next.from, next.to)) {
                 best.push(next);
             }
         }
@@ -439,13 +457,39 @@ fn refined(sums: &ScanSums<'_>, mut best: Interval) -> Interval {
             break;
         }
     }
-    // A shift that starts with nearly the first rows is reported as its complement, unless the first rows contradict.
-    if best.from <= 3 * SHORTEST && best.to + 1 < n {
-        let (low, high) = (sums.at_row(best.to + 1, &mut known).to_vec(), sums.at_row(n, &mut known));
-        let evidence = sums.evidence(best.to + 1, n - 1, &low, high, &mut work);
+    for equivalent in equivalents(&sums.strip.stations, best) {
+        let low = sums.at_row(equivalent.start, &mut known).to_vec();
+        let high = sums.at_row(equivalent.end, &mut known);
+        let evidence = sums.evidence(equivalent.start, equivalent.end - 1, &low, high, &mut work);
         if evidence > best.evidence - TIE_EVIDENCE {
-            return Interval { from: best.to + 1, to: n - 1, evidence };
+            return Interval { from: equivalent.start, to: equivalent.end - 1, evidence };
         }
     }
     best
+}
+
+/// Rows whose shift reads the same as that of an interval, if what shifted is what each station, or the whole, is free to place: from where the
+/// change happened to the end of its station, or of all.
+///
+/// An interval that starts with nearly the first rows of a station has its complement in the station in which it ends; one that ends with
+/// a later station starts in the middle of its first.
+fn equivalents(stations: &[Range<usize>], best: Interval) -> Vec<Range<usize>> {
+    let starts = |range: &Range<usize>| (range.start..=range.start + 3 * SHORTEST).contains(&best.from);
+    let of = |row: usize| stations.iter().find(|range| range.contains(&row)).cloned();
+    let Some(last) = of(best.to) else { return Vec::new() };
+    let all = last.end.max(stations.last().map_or(0, |range| range.end));
+    let after = best.to + 1;
+    let mut out = Vec::new();
+    if after < last.end && stations.iter().any(starts) {
+        out.push(after..last.end);
+    }
+    if after < all && best.from <= 3 * SHORTEST {
+        out.push(after..all);
+    }
+    if after == last.end && let Some(first) = of(best.from).filter(|first| first.end < after) {
+        out.push(best.from..first.end);
+    }
+    out.dedup();
+    out.retain(|range| range.len() >= SHORTEST || stations.len() == 1);
+    out
 }

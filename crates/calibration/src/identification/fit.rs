@@ -302,7 +302,7 @@ pub struct Outliers {
 pub const OUTLIER_CUT: f64 = 10.0;
 
 /// Largest share of rejected rows: more is a systematic effect.
-const OUTLIER_SHARE: f64 = 0.1;
+pub(crate) const OUTLIER_SHARE: f64 = 0.1;
 
 /// σ of one coordinate or length over the median size of the errors: 1.4826 for |normal|; the norm of three coordinates has median 1.538 σ.
 pub(crate) fn sigma_per_median(sensor: Sensor) -> f64 {

@@ -6,15 +6,16 @@
 //! poses (which placing the work object takes up), and Σ the covariance of the parameters, the mean square over all directions of r is
 //! ⅔ |r|² trace(J Σ Jᵀ).
 
-use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
+use nalgebra::{DMatrix, Matrix3, SymmetricEigen, UnitQuaternion};
 
 use super::fit::Fitted;
-use super::start;
 use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::registration;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::jacobian::{BaseAndTool, parameter_jacobian};
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
+use truegrind_math::se3::Pose;
 use truegrind_math::work::checkpoint;
 
 /// Standard deviation that the readings alone leave of a direction from which it counts as not seen (mm): more than half of the
@@ -27,7 +28,11 @@ const TIP_MM: f64 = 100.0;
 /// Range of orientations below which they are one (°).
 const ONE_ORIENTATION_DEG: f64 = 5.0;
 
+/// Spread of orientations beside their main axis below which they turn about that axis only (°, RMS).
+const ONE_AXIS_DEG: f64 = 5.0;
+
 /// The sentence; `None` where the poses or a stated frame show the target's place, or a cable measures: its length hardly ever does.
+/// `dataset` has the rows that count: none with a gross error.
 pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Estimated) -> Option<String> {
     if dataset.sensor == Sensor::Cable {
         return None;
@@ -42,19 +47,18 @@ pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Esti
     let prior_mm = fitted.priors[places[0]].sigma;
     // What an arm's unmodelled errors look like moves an unseen target farther than its standard deviation says.
     let is_frame_stated = place(Parameter::SensorFrame(0)).is_some_and(|k| fitted.priors[k].sigma < prior_mm);
-    let is_held = !is_frame_stated && start::unseen_target(dataset, &estimated.nominal).is_some();
+    let at = fitted.frames.flange_from_target.translation.vector;
+    let flanges = flanges(dataset, estimated);
+    // By the poses, and how far the arm of the data sheet is off. Not by what the readings leave beside it in one frame: these may be of
+    // several stations, or displaced, and turn the flange all the same.
+    let is_held = !is_frame_stated
+        && !registration::poses_show_target(&flanges, &at, estimated.registered.fitted.rmse);
     let of_readings_mm = (sigma_mm.powi(-2) - prior_mm.powi(-2)).max(0.0).sqrt().recip();
     if !is_held && of_readings_mm < UNSEEN_MM {
         return None;
     }
     let moved_mm = axes.map(|k| fitted.estimate.x[places[k]].abs()).into_iter().fold(0.0, f64::max);
-    let at = fitted.frames.flange_from_target.translation.vector;
-    let range_deg = orientation_range_deg(dataset, estimated);
-    let poses = if range_deg < ONE_ORIENTATION_DEG {
-        format!("which hold the flange in one orientation (within {range_deg:.1}°)")
-    } else {
-        "which turn the flange about one axis only".to_owned()
-    };
+    let poses = turning(&flanges);
     let known_mm = sigma_mm.max(prior_mm).max(moved_mm);
     // To what it is known to, not a rounded 0.
     let decimals = if known_mm < 0.95 { (-known_mm.max(1e-3).log10().floor()) as usize } else { 0 };
@@ -73,12 +77,34 @@ pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Esti
     ))
 }
 
-/// Largest angle between the orientation of the flange in a row and that of the first (°).
-fn orientation_range_deg(dataset: &Dataset, estimated: &Estimated) -> f64 {
+/// The flange in each row, by the data sheet.
+fn flanges(dataset: &Dataset, estimated: &Estimated) -> Vec<Pose> {
     let arm = estimated.nominal.at_condition(&estimated.condition);
-    let mut rotations = dataset.rows.iter().map(|row| arm.forward(&row.joints).rotation);
-    let Some(first) = rotations.next() else { return 0.0 };
-    rotations.map(|rotation| rotation.angle_to(&first)).fold(0.0, f64::max).to_degrees()
+    dataset.rows.iter().map(|row| arm.forward(&row.joints)).collect()
+}
+
+/// How poses turn the flange, as a clause.
+fn turning(flanges: &[Pose]) -> String {
+    let rotations: Vec<UnitQuaternion<f64>> = flanges.iter().map(|flange| flange.rotation).collect();
+    let Some(first) = rotations.first() else { return String::new() };
+    let range_deg = rotations.iter().map(|r| r.angle_to(first)).fold(0.0, f64::max).to_degrees();
+    if range_deg < ONE_ORIENTATION_DEG {
+        return format!("which hold the flange in one orientation (within {range_deg:.1}°)");
+    }
+    if beside_main_axis_deg(&rotations) < ONE_AXIS_DEG {
+        return "which turn the flange about one axis only".to_owned();
+    }
+    "which are too few, or turn the flange too little about different axes, for what the readings are off by".to_owned()
+}
+
+/// Spread of rotations beside the axis about which they turn most (°, RMS). A rotation by θ about an axis a moves a direction d by up to
+/// 2 sin(θ/2) |a × d|: turned about one axis alone, that axis stays where it is.
+fn beside_main_axis_deg(rotations: &[UnitQuaternion<f64>]) -> f64 {
+    let count = rotations.len().max(1) as f64;
+    let matrices = || rotations.iter().map(|r| r.to_rotation_matrix().into_inner());
+    let mean = matrices().sum::<Matrix3<f64>>() / count;
+    let spread = matrices().map(|r| (r - mean).transpose() * (r - mean)).sum::<Matrix3<f64>>() / count;
+    SymmetricEigen::new(spread).eigenvalues.min().max(0.0).sqrt().to_degrees()
 }
 
 /// Error that a tip has beside that of the target (mm, 1 σ, RMS over the measured region and all directions).

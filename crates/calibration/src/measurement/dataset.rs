@@ -64,6 +64,11 @@ impl Dataset {
         if self.sensor == Sensor::Cable { 1 } else { self.places() }
     }
 
+    /// The station of a row, by index; the first for cables.
+    pub fn station_of(&self, row: usize) -> usize {
+        if self.sensor == Sensor::Cable { 0 } else { self.rows[row].anchor }
+    }
+
     fn places(&self) -> usize {
         self.rows.iter().map(|r| r.anchor + 1).max().unwrap_or(1)
     }

@@ -142,8 +142,7 @@ impl UnseenTarget {
     fn of(normal: &Normal, at: usize, rmse_mm: f64, n: usize) -> Option<Self> {
         let rmse_mm = rmse_mm.max(EXACT_MM);
         let least = normal.least_information(at)? / n as f64;
-        let sees = least > 0.0 && rmse_mm / least.sqrt() <= TARGET_SIGMA_MM;
-        (!sees).then(|| Self { per_mm: rmse_mm * (n as f64).sqrt() / TARGET_SIGMA_MM })
+        (!is_seen(least, rmse_mm)).then(|| Self { per_mm: rmse_mm * (n as f64).sqrt() / TARGET_SIGMA_MM })
     }
 
     /// Adds the prior's rows about the flange's origin to equations of `size` unknowns.
@@ -154,6 +153,49 @@ impl UnseenTarget {
             normal.add(&row, self.per_mm * target_mm[k]);
         }
     }
+}
+
+/// Whether rows with so much information each on the least seen direction of the target show it, `rmse_mm` being off.
+fn is_seen(least_information: f64, rmse_mm: f64) -> bool {
+    least_information > 0.0 && rmse_mm.max(EXACT_MM) / least_information.sqrt() <= TARGET_SIGMA_MM
+}
+
+/// The equations of rows that see the target at `target_mm` on the flange: the sensor's frame (3 + 3), then the target.
+fn add_target_rows(
+    flange: &Pose,
+    target_mm: &Vector3<f64>,
+    seen_mm: &Vector3<f64>,
+    base_mm: &Vector3<f64>,
+    normal: &mut Normal,
+) {
+    let residual = flange.rotation * target_mm + flange.translation.vector - seen_mm - base_mm;
+    let turn = skew(seen_mm);
+    let to_base = flange.rotation.to_rotation_matrix();
+    for k in 0..3 {
+        let mut row = [0.0; 9];
+        row[k] = -1.0;
+        for c in 0..3 {
+            row[3 + c] = turn[(k, c)];
+            row[6 + c] = to_base[(k, c)];
+        }
+        normal.add(&row, residual[k]);
+    }
+}
+
+/// Whether poses show the place of a target near `target_mm` on the flange beside the sensor's frame, where the arm is off by `rmse_mm`.
+///
+/// What a reading is does not count: only how the poses turn the flange.
+pub fn poses_show_target(base_from_flange: &[Pose], target_mm: &Vector3<f64>, rmse_mm: f64) -> bool {
+    let places: Vec<Vector3<f64>> =
+        base_from_flange.iter().map(|f| (f * Point3::from(*target_mm)).coords).collect();
+    // The sensor's frame about the middle of the places, where its turn and its place are told apart best.
+    let middle = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+    let mut normal = Normal::new(9);
+    for (flange, place) in base_from_flange.iter().zip(&places) {
+        add_target_rows(flange, target_mm, &(place - middle), &middle, &mut normal);
+    }
+    let least = normal.least_information(6).map_or(0.0, |least| least / places.len().max(1) as f64);
+    is_seen(least, rmse_mm)
 }
 
 /// The sensor's frame and its unknown target on the flange.
@@ -170,19 +212,7 @@ pub fn target_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -> 
         let (base_from_sensor, t) = state;
         for (flange, m) in base_from_flange.iter().zip(measured_mm) {
             let seen = base_from_sensor.rotation * m;
-            let residual =
-                flange.rotation * t + flange.translation.vector - seen - base_from_sensor.translation.vector;
-            let turn = skew(&seen);
-            let to_base = flange.rotation.to_rotation_matrix();
-            for k in 0..3 {
-                let mut row = [0.0; 9];
-                row[k] = -1.0;
-                for c in 0..3 {
-                    row[3 + c] = turn[(k, c)];
-                    row[6 + c] = to_base[(k, c)];
-                }
-                normal.add(&row, residual[k]);
-            }
+            add_target_rows(flange, t, &seen, &base_from_sensor.translation.vector, normal);
         }
     };
     let step = |state: &(Pose, Vector3<f64>), d: &DVector<f64>| {

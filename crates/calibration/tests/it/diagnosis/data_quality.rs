@@ -1,13 +1,14 @@
 //! What is wrong with the rows or the data sheet is a finding, and hides no cause.
 
+use nalgebra::Vector3;
 use truegrind_arm::estimated::Judgement;
 use truegrind_arm::model::Model;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
+use truegrind_calibration::diagnosis::finding::{Alternative, Confidence, Finding};
 use truegrind_calibration::diagnosis::transfer::new_rows;
 use truegrind_calibration::identification::tolerance::Tolerance;
-use truegrind_calibration::measurement::dataset::{Dataset, Row, Sensor};
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 
 use super::scenarios::frames;
 use super::simulator::{Hidden, Log, Setup, run};
@@ -57,6 +58,64 @@ fn one_wild_reading_hides_no_cause() {
     let alone = names(std::slice::from_ref(&gear));
     assert_eq!(alone, [("gear-eccentricity".to_owned(), Some(vec![4]))]);
     assert_eq!(names(&[gear, Hidden::Outliers { list: vec![50], mm: 2000.0 }]), alone);
+}
+
+/// What the other parameters absorb of a gear's error in a row whose reading is metres off is no size of the gear's error; nor do such readings
+/// say how the poses turn the flange.
+#[test]
+fn wild_readings_change_neither_the_size_of_a_finding_nor_what_is_said_of_the_poses() {
+    let gear = Hidden::Gear { joint: 3, order: 1.0, peak_rad: 0.0015, phase: 0.4 };
+    let told = |hidden: &[Hidden]| {
+        let found = diagnosed(&run(&arm(), hidden, &setup(200, 11)).dataset, &arm());
+        let worth = finding(&found, "gear-eccentricity").and_then(|gear| gear.worth_mm).unwrap();
+        let reasons = found.estimated.verdict.reasons;
+        assert!(!reasons.iter().any(|reason| reason.contains("where the target sits")), "{reasons:?}");
+        worth
+    };
+    let alone = told(std::slice::from_ref(&gear));
+    let list = vec![5, 30, 55, 80, 105, 130, 155];
+    let beside = told(&[gear, Hidden::Outliers { list, mm: 3000.0 }]);
+    assert!((beside / alone - 1.0).abs() < 0.1, "{beside} mm beside wild readings, {alone} mm without them");
+}
+
+/// The rows with the readings that `of` makes of them.
+fn with_readings(dataset: &Dataset, of: impl Fn(usize) -> Vector3<f64>) -> Dataset {
+    let mut out = dataset.clone();
+    for (index, row) in out.rows.iter_mut().enumerate() {
+        row.reading = Reading::Position(of(index));
+    }
+    out
+}
+
+fn refused(dataset: &Dataset) -> Option<String> {
+    let frames = frames(dataset, &arm());
+    let found = diagnose(dataset, "abb-irb-120", &arm(), &frames, &Options::default(), &|_| ());
+    found.err().map(|error| error.to_string())
+}
+
+/// One reading is missing, so that each later row has that of the next: most rows fit all the same, but no cause is to be found in the others.
+#[test]
+fn a_missing_reading_is_told_and_no_cause_is_searched() {
+    let rows = run(&arm(), &[], &setup(132, 61)).dataset;
+    for first in [60, 85] {
+        let place = |row: usize| rows.rows[row].reading.place_mm();
+        let slipped = with_readings(&rows, |row| place(if row < first { row } else { (row + 1).min(131) }));
+        let told = refused(&slipped).expect("rows that are refused");
+        assert!(told.contains("each reading belongs to the row after it"), "{first}: {told}");
+    }
+}
+
+/// Half of the rows are a mirror image, in a station of their own: whatever is set aside, the others are no diagnosis.
+#[test]
+fn a_mirrored_station_is_refused() {
+    let rows = run(&arm(), &[], &setup(132, 62)).dataset;
+    let mut mirrored = with_readings(&rows, |row| {
+        let place = rows.rows[row].reading.place_mm();
+        if row < 66 { place } else { Vector3::new(place.x, -place.y, place.z) }
+    });
+    mirrored.rows.iter_mut().skip(66).for_each(|row| row.anchor = 1);
+    let told = refused(&mirrored).expect("rows that are refused");
+    assert!(told.contains("more than any arm"), "{told}");
 }
 
 #[test]
@@ -195,4 +254,20 @@ fn copies_test_nothing() {
     let fresh = all.subset(&(60..100).collect::<Vec<usize>>());
     assert_eq!(new_rows(&own, &fresh, &mut notes).unwrap().rows.len(), 40);
     assert!(notes.is_empty());
+}
+
+/// A tracker that moved while it stood in its second place: each place has a frame of its own, so that a shift of its first rows and one of
+/// its later rows are the same.
+#[test]
+fn a_station_that_moved_is_one_event() {
+    for (from, to) in [(130, 199), (100, 129)] {
+        let hidden = [Hidden::Frame { from, to, mm: [0.3, -0.2, 0.1] }];
+        let mut dataset = run(&arm(), &hidden, &setup(200, 71)).dataset;
+        dataset.rows.iter_mut().skip(100).for_each(|row| row.anchor = 1);
+        let found = diagnosed(&dataset, &arm());
+        let shift = finding(&found, "sensor-frame-shift").unwrap();
+        assert_eq!((shift.rows, shift.confidence), (Some([130, 199]), Confidence::Identified), "{shift:?}");
+        let level = |other: &&Alternative| other.effect == shift.effect && other.beaten_by < 100.0;
+        assert_eq!(shift.alternatives.iter().find(level), None, "{shift:?}");
+    }
 }
