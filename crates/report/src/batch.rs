@@ -1,6 +1,6 @@
 //! Report over many programs: one row per program, totals, and failures.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -78,6 +78,9 @@ pub struct Row {
     /// How its stationary work objects with corrected motions are placed.
     #[serde(default)]
     pub placed: Vec<Placed>,
+    /// Routines with motions that it declares, and those that it calls and does not declare, in lower case.
+    #[serde(default)]
+    pub routines: [Vec<String>; 2],
 }
 
 impl Row {
@@ -110,6 +113,10 @@ impl Row {
             reason: most_frequent_reason(plan),
             shape_only: most.is_some_and(|most| most.shape_only),
             placed: placement::placed(plan, listing),
+            routines: [
+                sorted_names(listing.routines.iter().map(|routine| routine.name.as_str())),
+                sorted_names(listing.outside_calls.iter().map(|call| call.name.as_str())),
+            ],
         }
     }
 
@@ -129,6 +136,7 @@ impl Row {
             reason: None,
             shape_only: false,
             placed: Vec::new(),
+            routines: Default::default(),
         }
     }
 
@@ -458,6 +466,39 @@ fn verdict(rows: &[Row]) -> Verdict {
         ));
     }
     Verdict::new(status, headline, reasons)
+}
+
+/// Names in lower case, each once.
+fn sorted_names<'n>(names: impl Iterator<Item = &'n str>) -> Vec<String> {
+    let names: BTreeSet<String> = names.map(str::to_ascii_lowercase).collect();
+    names.into_iter().collect()
+}
+
+/// Makes corrected programs doubtful whose routines another program of the run calls: they were read as if a displacement, a load or a tool
+/// of the caller did not hold there. Whether there are any.
+pub fn doubt_called(rows: &mut [Row]) -> bool {
+    let mut callers: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (index, row) in rows.iter().enumerate() {
+        row.routines[1].iter().for_each(|name| callers.entry(name.clone()).or_default().push(index));
+    }
+    if callers.is_empty() {
+        return false;
+    }
+    let files: Vec<String> = rows.iter().map(|row| row.file.clone()).collect();
+    let mut found = false;
+    for (index, row) in rows.iter_mut().enumerate().filter(|(_, row)| row.ended == Ended::Changed) {
+        let called = row.routines[0].iter().filter_map(|name| {
+            let caller = callers.get(name)?.iter().find(|caller| **caller != index)?;
+            Some((name, &files[*caller]))
+        });
+        let Some((name, caller)) = called.min_by_key(|(_, caller)| *caller) else { continue };
+        let caller = caller.rsplit(['/', '\\']).next().unwrap_or(caller);
+        row.doubt = Some(format!(
+            "{caller} calls {name}: what holds there (displacement, load, tools) was not read. Give the modules of one task together (--together)"
+        ));
+        found = true;
+    }
+    found
 }
 
 /// Whether parts of one workpiece shift against each other, since some programs keep their placement and others correct it.

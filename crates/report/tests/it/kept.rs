@@ -133,6 +133,7 @@ proptest! {
             reason: None,
             shape_only: true,
             placed: vec![Placed { name: text.clone(), frame: text.clone(), shape_only: true }],
+            routines: [vec![text.clone()], vec![text.clone(), text.clone()]],
         };
         let back: Row = serde_json::from_str(&serde_json::to_string(&row).unwrap()).unwrap();
         prop_assert_eq!(format!("{row:?}"), format!("{back:?}"));
@@ -174,4 +175,25 @@ fn programs_of_one_work_object_that_are_placed_differently_are_told() {
     assert!(!told(&[moved.clone(), row("parts/p4.mod", "wA", "here", false)]));
     assert!(!told(&[moved.clone(), row("parts/p4.mod", "wB", "here", true)]));
     assert!(!told(&[moved, row("parts/p4.mod", "wA", "elsewhere", true)]));
+}
+
+/// A routine under the displacement of a caller in another program of the run was corrected as if there were none.
+#[test]
+fn a_program_that_another_of_the_run_calls_may_not_run_unchecked() {
+    let row = |file: &str, declares: &[&str], calls: &[&str]| Row {
+        motions: [8, 8, 0, 0, 0],
+        routines: [declares, calls].map(|names| names.iter().map(|name| (*name).to_owned()).collect()),
+        ..Row::without(file.to_owned(), Ended::Changed, None)
+    };
+    let mut rows =
+        vec![row("in/face.mod", &["facep"], &[]), row("in/mainm.mod", &["main"], &["facep", "grip"])];
+    assert!(batch::doubt_called(&mut rows));
+    let text = truegrind_report::format::terminal::document(&batch::summary(&rows), 300);
+    assert!(
+        text.contains("mainm.mod calls facep") && text.contains("1 of 2 is corrected and may run"),
+        "{text}"
+    );
+    let mut apart =
+        vec![row("in/face.mod", &["facep"], &["facep"]), row("in/mainm.mod", &["main"], &["grip"])];
+    assert!(!batch::doubt_called(&mut apart));
 }
