@@ -8,7 +8,9 @@ use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
 use crate::plan::MotionOutcome;
 use crate::risk::beyond_noise::ALIKE_RAD;
+use crate::risk::cut_risk::UnseenShare;
 use crate::target::solved_target::SolvedTargets;
+use truegrind_arm::estimated::Estimated;
 use truegrind_programs::motion::load::Grip;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Origin, Place, Switch};
 
@@ -77,6 +79,22 @@ pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item =
         format!(
             "the measurement deviates from this model by {beyond:.3} mm RMS more than noise explains: programs may be off by as much beyond every σ \
              stated here; `truegrind diagnose` looks for the causes"
+        )
+    })
+}
+
+/// A smaller σ is small enough whatever it comes from (mm).
+const WORTH_TELLING_MM: f64 = 0.05;
+
+/// What of the stated σ comes from parameters that the measurement did not show, where that is most of it.
+pub(crate) fn unseen_note(knowledge: &Estimated, unseen: &UnseenShare) -> Option<String> {
+    let name = &knowledge.parameters.get(unseen.parameter?)?.name;
+    (unseen.unseen_mm > WORTH_TELLING_MM).then(|| {
+        format!(
+            "of the {:.3} mm (1σ) stated for a cut, {:.3} mm are not what the measurement found uncertain but what it could not show: {name} above all \
+             keeps the tolerance of this arm's links, since the place of the target on the flange is not known independently. Where tool and work \
+             object are taught with this arm (cell file, origin = \"taught\"), such errors cancel",
+            unseen.sigma_mm, unseen.unseen_mm
         )
     })
 }
