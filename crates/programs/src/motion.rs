@@ -538,6 +538,8 @@ pub struct NcFacts {
     pub other_axes: BTreeMap<char, Place>,
     /// Motions that call a program outside their file (NC).
     pub external_calls: Vec<u32>,
+    /// Motions behind a label, a jump, a call or a loop that are left because words are missing there, with these words.
+    pub unstated: BTreeMap<u32, String>,
 }
 
 /// An offset of a target by persistent data, which stay on the controller when the program ends: an operator or another task may change

@@ -56,6 +56,29 @@ const BEYOND_SIGMA: f64 = 2.0;
 /// Share of the largest σ from which an error that it counts is stated.
 const COUNTED_SHARE: f64 = 0.5;
 
+/// Sets of missing words that are told.
+const TOLD_SETS: usize = 4;
+
+/// The words that motions lack behind labels, jumps, calls and loops, each set with its lines.
+fn unstated_notes(listing: &Listing) -> Vec<String> {
+    let mut sets: Vec<(&str, Vec<u32>)> = Vec::new();
+    for (motion, words) in &listing.nc.unstated {
+        match sets.iter_mut().find(|(known, _)| known == words) {
+            Some((_, motions)) => motions.push(*motion),
+            None => sets.push((words, vec![*motion])),
+        }
+    }
+    let note = |(words, motions): &(&str, Vec<u32>)| {
+        let lines = lines_of(listing, motions)?;
+        Some(format!(
+            "behind a label, jump, call, loop or branch the text does not tell these, and {} without them: {words}. State them in the first \
+             of these blocks or between the label and it ({lines})",
+            counted(motions.len(), "motion is left", "motions are left")
+        ))
+    };
+    sets.iter().take(TOLD_SETS).filter_map(note).collect()
+}
+
 /// What the measurement of the arm deviates from its model beyond the noise: where a σ is mostly that, how it is counted; in a model of an
 /// earlier version, where it is more than every σ of the program.
 pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item = f64>) -> Option<String> {
@@ -145,11 +168,13 @@ pub(crate) fn unchecked_notes(
             counted(to_persistent.len(), "motion goes", "motions go")
         ));
     }
+    out.extend(unstated_notes(listing));
     if let Some(lines) = lines_of(listing, &listing.nc.external_calls) {
         out.push(format!(
-            "{} not in the same file: it is assumed to leave work offset, shifts, tool, units and tool centre point control \
-             unchanged ({lines})",
-            counted(listing.nc.external_calls.len(), "block calls a program that is", "blocks call a program that is")
+            "{} that is not followed: NC programs are read each by itself, whether or not the other one is given too, lies in the same folder or \
+             stands in the same archive file (--together is for modules of RAPID). It is assumed to leave work offset, shifts, tool, units and tool \
+             centre point control unchanged; state behind the call again what it changes ({lines})",
+            counted(listing.nc.external_calls.len(), "block calls another program", "blocks call another program")
         ));
     }
     out.extend(outside_calls_note(listing));

@@ -166,6 +166,11 @@ impl GroupTable {
         self.word_reason = because;
     }
 
+    /// Whether the value of a group depends on the path to here.
+    pub(super) fn is_unknown_after_join(&self, group: ModalGroup) -> bool {
+        self.unknown_after_join & group.bit() != 0
+    }
+
     /// Why one of these groups is unknown; `None` where all are known.
     pub(super) fn unknown_reason(&self, groups: u32) -> Option<Reason> {
         if self.unknown_by_word & groups != 0 {

@@ -22,6 +22,7 @@ mod paths;
 mod block;
 mod shift;
 mod turn;
+mod unstated;
 mod file_scan;
 mod prescan;
 mod tools;
@@ -386,6 +387,7 @@ impl<'t, 's> Interpreter<'t, 's> {
     ) {
         self.listing.motions.truncate(motions);
         self.listing.nc.external_calls.retain(|call| (*call as usize) < motions);
+        self.listing.nc.unstated.retain(|motion, _| (*motion as usize) < motions);
         self.listing.predecessors.split_off(&(motions as u32));
         self.listing.speeds.truncate(speeds);
         self.listing.zones.truncate(zones);

@@ -294,7 +294,9 @@ fn verdict_and_page_tell_what_to_look_at() {
         called.nc.external_calls = vec![call];
         let text = terminal::document(&view::summary(&plan, &called, &files), 200);
         assert_eq!(
-            text.contains("[warning] Corrected, but a called program that is not given"),
+            text.contains(
+                "[warning] Corrected, but a call of another program may change what holds behind it"
+            ),
             is_depended_on,
             "{text}"
         );

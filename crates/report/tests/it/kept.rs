@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use serde_json::json;
 use truegrind_arm::region::Outside;
 use truegrind_compensation::deviation::{
-    After, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
+    After, BetweenTargets, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
 };
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
@@ -83,6 +83,20 @@ prop_compose! {
     }
 }
 
+fn between() -> impl Strategy<Value = BetweenTargets> {
+    let lines = || prop::option::of(Just("lines 3, 7".to_owned()));
+    (number(), prop::option::of(number()), (0..9_usize, lines()), (0..9_usize, lines())).prop_map(
+        |(tolerance_mm, largest_mm, (beyond, beyond_lines), (unchecked, unchecked_lines))| BetweenTargets {
+            tolerance_mm,
+            largest_mm,
+            beyond,
+            beyond_lines,
+            unchecked,
+            unchecked_lines,
+        },
+    )
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -92,6 +106,7 @@ proptest! {
         repeated in any::<bool>(),
         held_out_mm in prop::option::of(number()),
         achieved in any::<bool>(),
+        between in prop::option::of(between()),
     ) {
         // Poses of tool and work object that follow each other are stated once.
         if let ([first, rest @ ..], true) = (points.as_mut_slice(), repeated) {
@@ -107,7 +122,7 @@ proptest! {
             reason: Some("out of reach".into()),
         };
         let missing = Some(MissingMotions { motions: vec![left], lines: "line 3".into() });
-        let report = PathReport { program: "a.mod".into(), files: vec!["b.mod".into()], model: "arm".into(), after, points, missing, differences: vec!["line 3: MoveJ".into()], held_out_mm };
+        let report = PathReport { program: "a.mod".into(), files: vec!["b.mod".into()], model: "arm".into(), after, points, missing, differences: vec!["line 3: MoveJ".into()], between, held_out_mm };
         let text = serde_json::to_string(&kept(&report)).unwrap();
         let back = from_kept(&serde_json::from_str(&text).unwrap()).unwrap();
         // Signs of zeros too, which == does not tell.

@@ -399,6 +399,10 @@ impl Interpreter<'_, '_> {
     /// state: it is assumed not to, and the call is listed in [`crate::motion::NcFacts::external_calls`].
     pub(super) fn subprogram(&mut self, block: &Block<'_>, name: &str) {
         let callee = self.callee(block);
+        // The words that a macro stands for are executed here, whatever they change.
+        if callee.as_ref().is_some_and(|name| self.scan.macros.contains(name)) {
+            return self.list_unknown_word(block, name, Reason::UnknownWord);
+        }
         let is_own = match &callee {
             Some(name) => is_label(name) || self.scan.programs.contains(name),
             None => true,

@@ -215,6 +215,10 @@ impl Interpreter<'_, '_> {
             _ => None,
         };
         if let Some(reason) = unknown {
+            if reason == Reason::UnknownFlow {
+                let to = self.end_position(block, &self.state.position);
+                self.note_unstated(block, mode, &to);
+            }
             self.list_left(block, "?", reason);
             self.invalidate_pose();
             return;
@@ -257,6 +261,9 @@ impl Interpreter<'_, '_> {
             start_dependency: self.start_dependency_of(block, mode),
             ..before.joined_with(&after)
         };
+        if motion.reason() == Some(Reason::UnknownFlow) {
+            self.note_unstated(block, mode, &to);
+        }
         let index = self.push(motion, context);
         self.state.preceding = Preceding::after(index);
         self.state.position = to;
