@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use super::dataset::{Dataset, Reading, Row, Sensor};
 use super::registration::{self, known_target};
+use super::row_list::row_list;
 use super::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
@@ -20,16 +21,19 @@ const FEWEST: usize = 4;
 /// The rows of a station do not say where it stood.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "{file}: the {rows} rows of station {station} (column station) do not show where it stood: measure at least {FEWEST} poses from each station, \
-     not on a line"
+    "{file}: the {rows} rows of station {station} (column station: {}) do not show where it stood: measure at least {FEWEST} poses from each \
+     station, not on a line, and write its name alike in all of its rows",
+    row_list(.numbers)
 )]
 pub struct StationError {
     /// File.
     pub file: String,
-    /// Station, from 1.
-    pub station: usize,
+    /// Station, as the file names it.
+    pub station: String,
     /// Its rows.
     pub rows: usize,
+    /// Their numbers in the file.
+    pub numbers: Vec<usize>,
 }
 
 /// How each station but the first stands to where the data sheet's arm puts it: nothing yet, to be fitted.
@@ -91,8 +95,9 @@ fn placed_by_arm(
     };
     let unplaced = |station: usize| StationError {
         file: dataset.file.clone(),
-        station: station + 1,
+        station: dataset.station_name(station),
         rows: stations[station].len(),
+        numbers: stations[station].iter().map(|&row| dataset.rows[row].number).collect(),
     };
     let largest = (0..stations.len()).max_by_key(|&station| stations[station].len()).unwrap_or_default();
     let target_mm = target_mm(&flanges(&stations[largest]), &stations[largest], dataset)

@@ -116,13 +116,20 @@ fn a_diagnosis_names_the_cause_and_no_shift_of_the_sensor() {
 }
 
 #[test]
-fn a_station_with_too_few_rows_is_refused_by_number() {
+fn a_station_with_too_few_rows_is_refused_by_name() {
     let (rows, _) = measured("position", 90);
     let mut rows = moved(rows);
     let kept: Vec<usize> = (0..rows.rows.len()).filter(|&i| rows.rows[i].anchor != 1 || i < 32).collect();
     rows = rows.subset(&kept);
-    let refused = match_to_arm(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap_err();
-    assert!(matches!(&refused, Mismatch::Station(why) if (why.station, why.rows) == (2, 2)), "{refused}");
+    let refusal =
+        |rows| match_to_arm(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap_err();
+    let refused = refusal(rows.clone());
+    assert!(matches!(&refused, Mismatch::Station(why) if (&*why.station, why.rows) == ("2", 2)), "{refused}");
+    // As typed, with its rows: an "s1" among "S1".
+    rows.station_names = ["S1", "s1", "S2"].map(str::to_owned).to_vec();
+    let [a, b] = [30, 31].map(|row| rows.rows[row].number);
+    let refused = refusal(rows).to_string();
+    assert!(refused.contains(&format!("station s1 (column station: rows {a} and {b})")), "{refused}");
 }
 
 #[test]
@@ -144,6 +151,7 @@ fn the_column_station_holds_names() {
     let rows = rows.unwrap();
     assert_eq!(rows.rows.iter().map(|row| row.anchor).collect::<Vec<_>>(), [0, 1, 0]);
     assert_eq!((rows.stations(), rows.anchors()), (2, 1));
+    assert_eq!(rows.station_names, ["door", "window"]);
     let refused = read("1,2,3,4,5,6,700,800,900,door\n2,3,4,5,6,7,701,801,901,\n").unwrap_err();
     assert!(refused.to_string().contains("the name of a station in every row, or in none"), "{refused}");
     // Of a cable it is a column like any other.
