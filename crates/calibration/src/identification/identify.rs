@@ -30,6 +30,7 @@ use crate::identification::verdict::{CONVERGED, Limits, NOT_NOISE, VerdictBuilde
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::{self, NoiseFloor};
 use crate::measurement::split::Split;
+use crate::measurement::stations::without_frames;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{
     Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict, WidthUncertainty,
@@ -350,12 +351,16 @@ fn fit_training_rows(
         return Err(WrongArm::Orientation { rad });
     }
     let on = |fitted: &Fitted| {
-        let held = errors_on(held, &fitted.model, &fitted.frames);
-        let errors = StageErrors {
-            fitted: summary_on(rows, &fitted.model, &fitted.frames),
-            held_out: ErrorSummary::of(held.iter().copied()),
+        let errors = errors_on(held, &fitted.model, &fitted.frames);
+        let counted = without_frames(&rows.dataset, &held.dataset, errors.clone());
+        // Where no station is placed well enough, large errors are better than none.
+        let is_counted = counted.iter().any(Option::is_some);
+        let held_out = if is_counted {
+            ErrorSummary::of(counted.into_iter().flatten())
+        } else {
+            ErrorSummary::of(errors.iter().copied())
         };
-        (errors, held)
+        (StageErrors { fitted: summary_on(rows, &fitted.model, &fitted.frames), held_out }, errors)
     };
     let mut training = stages.geometry(rows, &registered);
     training.problem.drop_rows();
