@@ -269,7 +269,8 @@ fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
         };
         let (before, after) = (of.before_mm, of.expected_mm?);
         Some(format!(
-            "largest deviation of the corrected motions{kind}: {before:.3} mm before, {after:.3} mm expected after (1σ)"
+            "largest deviation of the corrected motions{kind}: {before:.3} mm before; after correction a standard deviation (1σ) of at most \
+             {after:.3} mm is expected"
         ))
     };
     found.iter().filter_map(of_kind).collect()

@@ -260,7 +260,7 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             // Both unsigned, since the expected deviation has no sign.
             let before = size(report);
             format!(
-                "Largest deviation {} before, {} expected after (1σ){}",
+                "Largest deviation {} before; after correction a standard deviation (1σ) of at most {} is expected{}",
                 known(before),
                 known(report.expected_mm()),
                 of_model(report),
