@@ -272,7 +272,11 @@ fn shows_more_than_noise(estimated: &Estimated) -> bool {
 
 /// Whether its verdict notes that the poses do not show where the target sits.
 fn shows_no_target(estimated: &Estimated) -> bool {
-    estimated.verdict.reasons.iter().any(|reason| reason.contains("do not show where the target sits on the flange"))
+    estimated
+        .verdict
+        .reasons
+        .iter()
+        .any(|reason| reason.contains("do not show where the target sits on the flange"))
 }
 
 /// Expected deviation of programs before and after correction.
