@@ -14,14 +14,14 @@ pub(super) fn position_decisions(trees: &[RapidTree<'_>]) -> BTreeSet<(u32, u32)
     let reads = |tree: &RapidTree<'_>, node: u32| {
         tree.nodes.kind(node) == Syntax::Function && is_position(tree.text(tree.nodes.first(node)))
     };
-    let all = |tree: &RapidTree<'_>| (0..tree.nodes.len() as u32).filter(|&node| reads(tree, node)).collect();
+    let all = |tree: &RapidTree<'_>| (0..tree.nodes.len()).filter(|&node| reads(tree, node)).collect();
     let found: Vec<Vec<u32>> = trees.iter().map(all).collect();
     if found.iter().all(Vec::is_empty) {
         return BTreeSet::new();
     }
     let mut deciding = HashSet::new();
     for tree in trees {
-        for node in 0..tree.nodes.len() as u32 {
+        for node in 0..tree.nodes.len() {
             for part in deciding_parts(tree, node) {
                 names_in(tree, part, &mut deciding);
             }
@@ -34,7 +34,7 @@ pub(super) fn position_decisions(trees: &[RapidTree<'_>]) -> BTreeSet<(u32, u32)
             let reads = found[first..].iter().take_while(|read| **read < tree.nodes.behind(node));
             out.extend(reads.map(|read| (file, *read)));
         };
-        for node in 0..tree.nodes.len() as u32 {
+        for node in 0..tree.nodes.len() {
             match tree.nodes.kind(node) {
                 Syntax::Assignment => {
                     if assigned(tree, node).is_some_and(|name| deciding.contains(&folded(name))) {
