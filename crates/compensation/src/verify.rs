@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 use self::alignment::align;
 use self::between_targets::Followed;
 use self::differences::Compared;
-use self::executed_end::{ExecutedEnd, by_motion};
+use self::executed_end::{ExecutedEnd, Run, by_motion};
 use self::kept_placement::KeptPlacement;
 use crate::arms::Arms;
 use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
@@ -79,17 +79,6 @@ pub struct VerificationTask<'a> {
     pub tolerance_mm: f64,
     /// Payloads that the two programs state; absent where the payload of the condition applies throughout.
     pub loads: [Option<&'a Loads>; 2],
-}
-
-/// A program that was run.
-struct Run {
-    /// In the order of the motions.
-    ends: Vec<ExecutedEnd>,
-    /// The motions without an end, with the reason.
-    without_end: Vec<(u32, OutcomeReason)>,
-    frame_table: FrameTable,
-    /// The conditions on the way to each motion; empty where none changes on the way.
-    schedules: Vec<ConditionSchedule>,
 }
 
 /// The rewritten program and its ends, by motion.

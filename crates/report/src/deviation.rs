@@ -124,7 +124,6 @@ fn point_columns((word, key): (&str, &str), decimals: usize, file: bool) -> Vec<
                 decimals,
             ));
         }
-        columns.push(Column::number(format!("{key}_turn_deg"), format!("{side} turn"), "°", 4));
     }
     columns.extend([
         Column::number("sigma_mm", "predicted 1σ", "mm", 3),
@@ -132,6 +131,10 @@ fn point_columns((word, key): (&str, &str), decimals: usize, file: bool) -> Vec<
         Column::text("status", "Status"),
         Column::text("reason", "Reason"),
     ]);
+    // Behind those that files of earlier versions have.
+    for (side, key) in [("before", "before"), (word, key)] {
+        columns.push(Column::number(format!("{key}_turn_deg"), format!("{side} turn"), "°", 4));
+    }
     columns
 }
 
@@ -145,22 +148,23 @@ fn point_cells(point: &PathPoint) -> Vec<Cell> {
                 d.vector_mm.z.into(),
                 d.norm_mm().into(),
                 d.normal_mm.into(),
-                d.angle_rad.to_degrees().into(),
             ],
-            None => [const { Cell::Missing }; 6],
+            None => [const { Cell::Missing }; 5],
         });
     }
     let [sigma, status, reason] = outcome(point);
     row.extend([sigma, sigma_of(point).into(), status, reason]);
+    row.extend([point.before, point.after].map(|d| d.map(|d| d.angle_rad.to_degrees()).into()));
     row
 }
 
 /// The row of a motion without a point, in the columns of [`point_cells`].
 fn missing_cells(motion: &MissingMotion) -> Vec<Cell> {
     let mut row = vec![Cell::Missing, (motion.line as usize).into(), motion.instruction.as_str().into()];
-    // Three coordinates, two deviations of six numbers, σ and what it is of.
-    row.extend([const { Cell::Missing }; 17]);
+    // Three coordinates, two deviations of five numbers, σ and what it is of.
+    row.extend([const { Cell::Missing }; 15]);
     row.extend([status_cell(motion.status), motion.reason.clone().into()]);
+    row.extend([const { Cell::Missing }; 2]);
     row
 }
 

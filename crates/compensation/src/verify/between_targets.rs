@@ -10,15 +10,13 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use super::Run;
 use super::differences::{nearest_share, way};
-use super::executed_end::ExecutedEnd;
+use super::executed_end::{ExecutedEnd, Run};
 use crate::arms::Arms;
 use crate::deviation::BetweenTargets;
 use crate::line_list::lines_of;
 use crate::options::Emit;
 use crate::segment::circle::Circle;
-use crate::segment::condition_schedule::ConditionSchedule;
 use crate::segment::curve::Curve;
 use crate::segment::line::{Segment, SegmentEnd, line_deviation, midpoint_deviations};
 use crate::segment::segment_plan::by_axes_mm;
@@ -314,12 +312,4 @@ fn deviations(pieces: &[Piece<'_>], followed: &Followed<'_>, arms: &Arms<'_>) ->
             along.max(by_axes.unwrap_or(0.0))
         })
         .collect()
-}
-
-impl Run {
-    /// The conditions on the way to an end.
-    fn schedule(&self, end: &ExecutedEnd) -> ConditionSchedule {
-        let alike = || ConditionSchedule { first: end.condition_index, later: Vec::new() };
-        self.schedules.get(end.motion).cloned().unwrap_or_else(alike)
-    }
 }

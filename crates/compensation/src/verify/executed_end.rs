@@ -1,6 +1,10 @@
 //! Where a motion ends when an arm runs it.
 
 use nalgebra::Vector3;
+
+use crate::frames::frame_table::FrameTable;
+use crate::plan::reason::OutcomeReason;
+use crate::segment::condition_schedule::ConditionSchedule;
 use truegrind_arm::estimated::RegisteredFrame;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
@@ -37,4 +41,23 @@ pub(crate) fn by_motion(ends: &[ExecutedEnd], motions: usize) -> Vec<Option<&Exe
 pub(crate) fn deviation(intended: &ExecutedEnd, reached: &ExecutedEnd) -> Vector3<f64> {
     let in_object = reached.reached.translation.vector - intended.commanded.translation.vector;
     intended.base_from_object.rotation * in_object
+}
+
+/// A program that was run.
+pub(crate) struct Run {
+    /// In the order of the motions.
+    pub(crate) ends: Vec<ExecutedEnd>,
+    /// The motions without an end, with the reason.
+    pub(crate) without_end: Vec<(u32, OutcomeReason)>,
+    pub(crate) frame_table: FrameTable,
+    /// The conditions on the way to each motion; empty where none changes on the way.
+    pub(crate) schedules: Vec<ConditionSchedule>,
+}
+
+impl Run {
+    /// The conditions on the way to an end.
+    pub(crate) fn schedule(&self, end: &ExecutedEnd) -> ConditionSchedule {
+        let alike = || ConditionSchedule { first: end.condition_index, later: Vec::new() };
+        self.schedules.get(end.motion).cloned().unwrap_or_else(alike)
+    }
 }

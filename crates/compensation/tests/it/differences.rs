@@ -178,7 +178,7 @@ fn a_tool_that_is_turned_at_its_target_is_told() {
         (&text, round, 1, "MoveC ends turned by"),
         (&dense, inserted, 0, "an added motion that ends turned by"),
     ] {
-        for (axis, deg) in [(0, 0.7), (1, 3.0), (2, -12.0)] {
+        for (axis, deg) in [(0, 0.7), (1, 3.0), (2, 5.0)] {
             let edited = text.replace(line, &turned(line, target, axis, deg));
             let found = judged(&program(), &edited).differences;
             let found: Vec<&String> =

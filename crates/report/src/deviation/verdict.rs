@@ -133,7 +133,7 @@ fn between_targets(report: &PathReport) -> Vec<Reason> {
     if let Some(lines) = unchecked_lines {
         let starts = if between.unchecked == 1 { "line or arc starts" } else { "lines or arcs start" };
         let words = format!(
-            "{}: {} {starts} at a place that is unknown or not corrected: the path to its end is not checked ({lines})",
+            "{}: {} {starts} at a place that is unknown or not corrected: the path from there is not checked ({lines})",
             report.model, between.unchecked
         );
         out.push((Status::Good, words));

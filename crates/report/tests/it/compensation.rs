@@ -96,7 +96,11 @@ fn the_json_is_the_contract_field_by_field() {
     let (plan, listing, files) = example();
     assert_eq!(listing.motions.len(), 7);
     let json = view::json(&plan, &listing, &files);
-    assert_eq!(keys(&json), BTreeSet::from(["schema", "programs", "placements", "cuts", "chance_of_worse"]));
+    assert_eq!(
+        keys(&json),
+        BTreeSet::from(["schema", "verdict", "programs", "placements", "cuts", "chance_of_worse"])
+    );
+    assert_eq!(keys(&json["verdict"]), BTreeSet::from(["status", "headline"]));
     assert_eq!(json["schema"], "truegrind.compensation/1");
     let programs = json["programs"].as_array().unwrap();
     assert_eq!(programs.len(), 2);

@@ -122,7 +122,7 @@ fn the_table_stands_in_the_work_object_with_every_column() {
         lines[0],
         "index,line,instruction,x_mm,y_mm,z_mm,before_dx_mm,before_dy_mm,before_dz_mm,before_norm_mm,before_normal_mm,\
          predicted_remainder_dx_mm,predicted_remainder_dy_mm,predicted_remainder_dz_mm,predicted_remainder_norm_mm,\
-         predicted_remainder_normal_mm,sigma_mm,sigma_of,status,reason"
+         predicted_remainder_normal_mm,sigma_mm,sigma_of,status,reason,before_turn_deg,predicted_remainder_turn_deg"
     );
     // Intended is turned back from the base into the work object.
     let number = |row: usize, column: usize| match table.rows[row][column] {
@@ -162,7 +162,7 @@ fn motions_without_a_point_stand_at_their_place_with_their_reason() {
         text.lines().skip(1).map(place).collect()
     };
     let text = csv::table(&view::table(&report));
-    assert!(text.lines().all(|line| line.split(',').count() == 20), "{text}");
+    assert!(text.lines().all(|line| line.split(',').count() == 22), "{text}");
     assert!(text.contains("\n,7,MoveJ,,,,,,,,,,,,,,,,refused,target is out of reach"), "{text}");
     assert_eq!(
         places(text),
