@@ -35,6 +35,8 @@ const IN_COMMON: f64 = 0.25;
 const UNEQUAL: f64 = 5.5;
 /// Variance of the larger differences over that of the others from which they are of another kind.
 const LARGER: f64 = 12.0;
+/// Differences from which their sizes are judged, evenly in their order.
+const MOST_SQUARES: usize = 2000;
 /// Share of larger differences up to which they are single gross readings.
 const FEW: f64 = 0.25;
 
@@ -204,7 +206,9 @@ impl Case<'_> {
 
     /// Half the mean square of differences of neighbouring residuals over the mean square of residuals, without the gross rows; at most 1.
     fn of_neighbours(&self, gross: &[usize]) -> f64 {
-        let rows: Vec<usize> = (0..self.residuals.len()).filter(|row| !gross.contains(row)).collect();
+        let mut is_gross = vec![false; self.residuals.len()];
+        gross.iter().for_each(|&row| is_gross[row] = true);
+        let rows: Vec<usize> = (0..self.residuals.len()).filter(|&row| !is_gross[row]).collect();
         let anchor = |row: usize| self.dataset.rows[row].anchor;
         let (mut sum, mut count) = (0.0, 0.0);
         for pair in rows.windows(2).filter(|pair| anchor(pair[0]) == anchor(pair[1])) {
@@ -363,6 +367,9 @@ impl Mixture {
     fn of(differences: &[Difference], axes: usize, step_mm: f64) -> Option<Self> {
         let mut squares: Vec<f64> = differences.iter().map(|d| d.by.norm_squared()).collect();
         squares.sort_by(f64::total_cmp);
+        // There can be a million.
+        let squares: Vec<f64> =
+            squares.iter().copied().step_by(squares.len().div_ceil(MOST_SQUARES)).collect();
         let count = squares.len() as f64;
         let axes = axes as f64;
         let one_size = squares.iter().sum::<f64>() / (axes * count);
