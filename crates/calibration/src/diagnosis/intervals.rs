@@ -486,7 +486,9 @@ fn equivalents(stations: &[Range<usize>], best: Interval) -> Vec<Range<usize>> {
     if after < all && best.from <= 3 * SHORTEST {
         out.push(after..all);
     }
-    if after == last.end && let Some(first) = of(best.from).filter(|first| first.end < after) {
+    if after == last.end
+        && let Some(first) = of(best.from).filter(|first| first.end < after)
+    {
         out.push(best.from..first.end);
     }
     out.dedup();

@@ -51,8 +51,8 @@ pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Esti
     let flanges = flanges(dataset, estimated);
     // By the poses, and how far the arm of the data sheet is off. Not by what the readings leave beside it in one frame: these may be of
     // several stations, or displaced, and turn the flange all the same.
-    let is_held = !is_frame_stated
-        && !registration::poses_show_target(&flanges, &at, estimated.registered.fitted.rmse);
+    let is_held =
+        !is_frame_stated && !registration::poses_show_target(&flanges, &at, estimated.registered.fitted.rmse);
     let of_readings_mm = (sigma_mm.powi(-2) - prior_mm.powi(-2)).max(0.0).sqrt().recip();
     if !is_held && of_readings_mm < UNSEEN_MM {
         return None;
@@ -94,7 +94,8 @@ fn turning(flanges: &[Pose]) -> String {
     if beside_main_axis_deg(&rotations) < ONE_AXIS_DEG {
         return "which turn the flange about one axis only".to_owned();
     }
-    "which are too few, or turn the flange too little about different axes, for what the readings are off by".to_owned()
+    "which are too few, or turn the flange too little about different axes, for what the readings are off by"
+        .to_owned()
 }
 
 /// Spread of rotations beside the axis about which they turn most (°, RMS). A rotation by θ about an axis a moves a direction d by up to

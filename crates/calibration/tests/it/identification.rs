@@ -4,6 +4,7 @@ mod beyond_noise;
 mod calibration;
 mod prior_width;
 mod promise;
+mod rounded_log;
 mod sensor_laws;
 mod stated_frame;
 mod stations;
