@@ -338,6 +338,7 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, arm: u64, out: &mut O
             program: "cut.mod",
             name: "",
             after: truegrind::After::Achieved,
+            tolerance_mm: CompensateOptions::default().tolerance_mm,
             loads: [None, None],
         };
         let acting = ActingArm {

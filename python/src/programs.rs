@@ -445,6 +445,7 @@ fn corrected(
         missing: plan.missing_motions(listing),
         points: std::mem::take(&mut plan.points),
         differences: Vec::new(),
+        between: None,
         held_out_mm: Some(arm.geometry.held_out.rmse),
     };
     let unused = Used::by(listing, &cell).notes(&cell, surface.as_ref());
@@ -536,13 +537,14 @@ impl PyDeviation {
 }
 
 /// Deviation of a program under a model; nothing is rewritten. With ``intended``, the original program defines the intended path, and
-/// ``program`` is its corrected version. With ``actual`` (an ``Arm`` of a simulation) the programs are run on that arm.
+/// ``program`` is its corrected version; ``tolerance_mm`` is the largest deviation of its path between two targets. With ``actual`` (an
+/// ``Arm`` of a simulation) the programs are run on that arm.
 #[pyfunction]
 #[pyo3(
     name = "deviation",
     signature = (
-        program, model, *, intended = None, actual = None, cell = None, surface = None, payload_kg = None,
-        payload_centre_mm = None, threads = None, progress = None
+        program, model, *, intended = None, actual = None, tolerance_mm = 0.05, cell = None, surface = None,
+        payload_kg = None, payload_centre_mm = None, threads = None, progress = None
     )
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
@@ -552,6 +554,7 @@ pub(crate) fn deviation_(
     model: Object<'_, NamedModel>,
     intended: Option<Object<'_, ProgramFiles>>,
     actual: Option<PyRef<'_, PyArm>>,
+    tolerance_mm: f64,
     cell: Option<Object<'_, PathOrText>>,
     surface: Option<PathBuf>,
     payload_kg: Option<f64>,
@@ -559,6 +562,7 @@ pub(crate) fn deviation_(
     threads: Option<i64>,
     progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyDeviation> {
+    let tolerance_mm = positive("tolerance_mm", tolerance_mm)?;
     let mut kept = None;
     let estimated = named(&model, &mut kept)?;
     let programs = sources(&program)?;
@@ -567,7 +571,8 @@ pub(crate) fn deviation_(
     let stated = Stated { payload_kg, payload_centre_mm, ..Stated::default() };
     let condition = stated.on(&estimated.arm.model, &estimated.arm.condition)?;
     let actual = actual.as_deref();
-    let task = Run { estimated, actual, programs: &programs, originals: originals.as_ref(), condition };
+    let originals = originals.as_ref();
+    let task = Run { estimated, actual, programs: &programs, originals, condition, tolerance_mm };
     run(py, threads, progress.as_deref(), || task.judged(&place, payload_kg.is_none()))
 }
 
@@ -578,6 +583,7 @@ struct Run<'a> {
     programs: &'a Sources,
     originals: Option<&'a Sources>,
     condition: Condition,
+    tolerance_mm: f64,
 }
 
 impl Run<'_> {
@@ -612,6 +618,7 @@ impl Run<'_> {
             program: &name,
             name: &named,
             after,
+            tolerance_mm: self.tolerance_mm,
             loads: [loads[0].as_ref(), loads[1].as_ref()],
         };
         let acting = ActingArm { nominal: &arm.nominal, model, knowledge, condition: self.condition };

@@ -565,10 +565,11 @@ def compensate(program: str | PathLike[str] | Sequence[str | PathLike[str]] | Ma
     use ``Compensation.save``.
     """
 
-def deviation(program: str | PathLike[str] | Sequence[str | PathLike[str]] | Mapping[str, str | bytes], model: Model | str | PathLike[str], *, intended: str | PathLike[str] | Sequence[str | PathLike[str]] | Mapping[str, str | bytes] | None = None, actual: Arm | None = None, cell: str | PathLike[str] | None = None, surface: str | PathLike[str] | None = None, payload_kg: SupportsFloat | SupportsIndex | None = None, payload_centre_mm: SupportsLenAndGetItem[SupportsFloat | SupportsIndex] | None = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Deviation:
+def deviation(program: str | PathLike[str] | Sequence[str | PathLike[str]] | Mapping[str, str | bytes], model: Model | str | PathLike[str], *, intended: str | PathLike[str] | Sequence[str | PathLike[str]] | Mapping[str, str | bytes] | None = None, actual: Arm | None = None, tolerance_mm: SupportsFloat | SupportsIndex = 0.05, cell: str | PathLike[str] | None = None, surface: str | PathLike[str] | None = None, payload_kg: SupportsFloat | SupportsIndex | None = None, payload_centre_mm: SupportsLenAndGetItem[SupportsFloat | SupportsIndex] | None = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Deviation:
     """
     Deviation of a program under a model; nothing is rewritten. With ``intended``, the original program defines the intended path, and
-    ``program`` is its corrected version. With ``actual`` (an ``Arm`` of a simulation) the programs are run on that arm.
+    ``program`` is its corrected version; ``tolerance_mm`` is the largest deviation of its path between two targets. With ``actual`` (an
+    ``Arm`` of a simulation) the programs are run on that arm.
     """
 
 def diagnose(dataset: Dataset, robot: Robot | str | PathLike[str], *, alpha: SupportsFloat | SupportsIndex = 0.01, most: SupportsIndex = 20, blocks: SupportsIndex = 10, smooth: bool = False, fuse_readout: bool = True, limit_rmse_mm: SupportsFloat | SupportsIndex | None = None, limit_max_mm: SupportsFloat | SupportsIndex | None = None, seed: SupportsIndex = 0, also: SupportsGetItem[int, Dataset] = ..., angles: "Literal['logged', 'dh'] | None" = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Diagnosis:

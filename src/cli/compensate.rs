@@ -82,11 +82,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let (cell, surface, condition) = arguments.cell.read(corrector.map(|c| c.arm))?;
     robot_match::refuse_other_cell(&cell, &robot, &nominal)?;
     let options = arguments.options(condition, jobs.len());
-    let setup = programs::setup(&cell, stated.or(Some(robot.as_str().into())));
+    let mut setup = programs::setup(&cell, stated.or(Some(robot.as_str().into())));
     let single = matches!(jobs.as_slice(), [job] if job.under.is_none() || job.paths.len() > 1);
     let exits_after = single && !arguments.shares.on();
-    let context = CompensateContext { arguments, corrector, cell, surface, setup, options, exits_after };
     let shared = read_log::finish();
+    setup.called = programs::called(&jobs);
+    let context = CompensateContext { arguments, corrector, cell, surface, setup, options, exits_after };
     if corrector.is_none() {
         let text = "model nominal: nothing to correct, every byte stays\n";
         if arguments.outputs.takes_stdout() || arguments.prints_program() {
@@ -103,7 +104,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let store = if arguments.shares.on() {
         let description = RunDescription {
             verb: "compensate",
-            options: arguments.relevant_options(),
+            options: match context.setup.called.is_empty() {
+                true => arguments.relevant_options(),
+                false => format!("{} {:?}", arguments.relevant_options(), context.setup.called),
+            },
             shared,
             context: context.exit_criteria().to_value(),
             output: arguments.output.as_deref().filter(|_| !dry),
@@ -144,6 +148,7 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
             missing: planned.missing_motions(listing),
             points: std::mem::take(&mut planned.points),
             differences: Vec::new(),
+            between: None,
             held_out_mm: context.corrector.map(|c| c.arm.geometry.held_out.rmse),
         };
         let reports = if context.corrector.is_some() { std::slice::from_ref(&report) } else { &[] };

@@ -100,6 +100,7 @@ impl Job<'_> {
             program: "blade.mod",
             name,
             after: After::Achieved,
+            tolerance_mm: RewriteBounds::default().tolerance_mm,
             loads: [None, None],
         };
         let acting = ActingArm {

@@ -46,6 +46,9 @@ pub(super) struct Arguments {
     /// Original program, which defines the intended path; PROGRAM is then its corrected version.
     #[arg(long, value_name = "ORIGINAL")]
     intended: Vec<PathBuf>,
+    /// Largest deviation of the corrected path from the intended one between two targets (mm); give the value that `compensate` had.
+    #[arg(long, value_name = "MM", default_value_t = 0.05, allow_negative_numbers = true)]
+    tolerance: f64,
     /// Simulated actual arm (from `simulate --arm`) that runs the programs.
     #[arg(long, value_name = "ARM.toml")]
     actual: Option<PathBuf>,
@@ -79,8 +82,11 @@ struct Runner {
     after: After,
 }
 
-/// Refuses options that only one program or one job can have.
+/// Refuses numbers out of range, and options that only one program or one job can have.
 fn check_combinations(arguments: &Arguments, jobs: usize, several: bool) -> anyhow::Result<()> {
+    if !(arguments.tolerance > 0.0 && arguments.tolerance.is_finite()) {
+        bail!("--tolerance {}: expected a length above 0 in mm", arguments.tolerance);
+    }
     if several && !arguments.intended.is_empty() {
         bail!("--intended is the original of one program: name one program, not {jobs}");
     }
@@ -145,6 +151,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         cell: &cell,
         setup: &setup,
         condition,
+        tolerance_mm: arguments.tolerance,
         arguments: &arguments.cell,
     };
     let shared = read_log::finish();
@@ -304,6 +311,7 @@ struct DeviationContext<'a> {
     cell: &'a Cell,
     setup: &'a Setup,
     condition: Condition,
+    tolerance_mm: f64,
     arguments: &'a CellArguments,
 }
 
@@ -354,6 +362,7 @@ impl DeviationContext<'_> {
                     program: &name,
                     name: &runner.name,
                     after: runner.after,
+                    tolerance_mm: self.tolerance_mm,
                     loads: [loads[0].as_ref(), loads[1].as_ref()],
                 };
                 let acting = ActingArm {

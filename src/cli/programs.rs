@@ -5,8 +5,10 @@ use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
+use rayon::prelude::*;
 use truegrind::compensation;
 use truegrind::compensation::cell::Cell;
+use truegrind::programs::nc::called::called_programs;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::rapid::task_list;
 use truegrind::programs::reading::{Language, Program};
@@ -376,6 +378,17 @@ impl Programs {
     pub(super) fn name(&self) -> String {
         self.files.iter().map(|(path, _)| files::name(path)).collect::<Vec<_>>().join(", ")
     }
+}
+
+/// The NC programs of a run that other programs of it call.
+pub(super) fn called(jobs: &[Job]) -> BTreeSet<String> {
+    let is_nc = |path: &&PathBuf| Language::by_name(&files::name(path)) == Some(Language::Nc);
+    let paths: Vec<&PathBuf> = jobs.iter().flat_map(|job| &job.paths).filter(is_nc).collect();
+    if paths.len() < 2 {
+        return BTreeSet::new();
+    }
+    let calls = |path: &&PathBuf| called_programs(&files::read(path).unwrap_or_default());
+    paths.par_iter().flat_map_iter(calls).collect()
 }
 
 /// Control settings that NC programs do not contain, from the cell file and the robot file. `robot`: catalogue name or file;

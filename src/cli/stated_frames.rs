@@ -21,7 +21,8 @@ pub(super) struct StatedFrameArguments {
     /// Frame of a position or pose sensor in the robot base: x,y,z (mm) or x,y,z,qw,qx,qy,qz; of several stations that of the first row.
     #[arg(long, value_name = "X,Y,Z[,Q…]", allow_hyphen_values = true)]
     sensor_frame: Option<String>,
-    /// Outlet of a draw-wire cable in the robot base: x,y,z (mm). Once per cable, in the order of the column `anchor`.
+    /// Outlet of a draw-wire cable in the robot base: x,y,z (mm). Once per cable, in the order of the column `anchor`. Needs
+    /// --cable-zero.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     outlet: Vec<String>,
     /// Zero offset of a cable: reading minus free length (mm). Once per cable.

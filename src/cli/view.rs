@@ -266,6 +266,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
         points,
         missing: None,
         differences: Vec::new(),
+        between: None,
         held_out_mm: Some(arm.geometry.held_out.rmse),
     };
     let scene = PathScene {
@@ -320,6 +321,7 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
             program: &program,
             name: stated.as_ref().map_or("nominal", |(name, _)| name),
             after: After::PredictedRemainder,
+            tolerance_mm: truegrind::compensation::options::Options::default().tolerance_mm,
             loads: [loads.as_ref(), None],
         },
         &acting,

@@ -46,7 +46,7 @@ fn every_key_of_a_surface_file_is_read() {
                 .insert("origin".to_owned(), Value::String(origin.to_owned()));
         }
         let path = coarse["path"].as_table_mut().unwrap();
-        path.insert("max_step_mm".to_owned(), Value::Float(20.0));
+        path.insert("max_step_mm".to_owned(), Value::Float(50.0));
         path.insert("lead_deg".to_owned(), Value::Float(2.0));
         if let Some(step) = path.get_mut("step_over_mm") {
             *step = Value::Float(25.0);

@@ -12,6 +12,7 @@ pub mod decision;
 mod error;
 pub mod orientation;
 pub mod path;
+mod stations;
 mod tested;
 
 use nalgebra::Vector3;
@@ -23,6 +24,7 @@ use truegrind_math::work::report_step;
 
 use self::orientation::Orientation;
 use self::path::{PathFound, seen};
+use self::stations::{StationErrors, uncounted};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Observations, errors_on, orientation_errors};
 use crate::identification::identify::prepare_observations;
@@ -36,6 +38,7 @@ use crate::measurement::split::{Split, folds};
 
 pub use self::decision::{Decision, FEWEST_POSES, Uncertainty};
 pub use self::error::AcceptError;
+pub use self::stations::Uncounted;
 pub use self::tested::{LEAST_SHARE, Tested};
 
 /// Poses and cycles at each for pose accuracy and repeatability (ISO 9283).
@@ -116,7 +119,7 @@ impl Coverage {
 /// Result of an acceptance test.
 #[derive(Debug, Clone)]
 pub struct Acceptance {
-    /// Number of different poses.
+    /// Number of different poses that count.
     pub poses: usize,
     /// Number of rows.
     pub rows: usize,
@@ -126,6 +129,8 @@ pub struct Acceptance {
     pub model: ErrorSummary,
     /// The same for each row, with the row's number in its file.
     pub errors_mm: Vec<(usize, f64)>,
+    /// Rows from small stations that show nothing of the arm.
+    pub uncounted: Option<Uncounted>,
     /// Expanded uncertainty, k = 2 (mm); 0 if unknown.
     pub uncertainty_mm: f64,
     /// Source of the uncertainty.
@@ -207,20 +212,24 @@ pub fn accept(
     let paths = paths(&all, &observed, &estimated.model, options)?;
     let dataset = &observed.dataset;
     report_step("judging the nominal arm");
-    let [nominal, nominal_rad] = errors(&observed, &estimated.nominal, options)?;
+    let nominal = errors(&observed, &estimated.nominal, options)?;
     report_step("judging the estimated arm");
-    let [found, found_rad] = errors(&observed, &estimated.model, options)?;
+    let found = errors(&observed, &estimated.model, options)?;
+    let counted = counted(&nominal, &found);
+    let ([nominal, nominal_rad], [found, found_rad]) = (nominal.at(&counted), found.at(&counted));
     let model = ErrorSummary::of(found.iter().copied());
     let groups = poses(dataset);
+    let tested_poses = poses(&dataset.subset(&counted)).len();
     let (uncertainty_mm, uncertainty) =
         Uncertainty::of(options.uncertainty_mm, noise_floor(dataset).map(|floor| floor.sigma_mm));
-    let numbered = |errors: Vec<f64>| dataset.rows.iter().map(|row| row.number).zip(errors).collect();
+    let numbers = || counted.iter().map(|&row| dataset.rows[row].number);
+    let numbered = |errors: Vec<f64>| numbers().zip(errors).collect();
     let orientation = (dataset.sensor == Sensor::Pose).then(|| {
         let model = ErrorSummary::of(found_rad.iter().copied());
         let (uncertainty_rad, uncertainty) =
             Uncertainty::of(options.uncertainty_rad, noise_floor_rad(dataset));
         let decided =
-            |tolerance| Decision::of(groups.len(), model.max, (uncertainty_rad, uncertainty), tolerance);
+            |tolerance| Decision::of(tested_poses, model.max, (uncertainty_rad, uncertainty), tolerance);
         Orientation {
             nominal: ErrorSummary::of(nominal_rad),
             errors_rad: numbered(found_rad),
@@ -232,7 +241,7 @@ pub fn accept(
         }
     });
     Ok(Acceptance {
-        poses: groups.len(),
+        poses: tested_poses,
         rows: dataset.rows.len(),
         nominal: ErrorSummary::of(nominal),
         errors_mm: numbered(found),
@@ -242,7 +251,8 @@ pub fn accept(
         is_registered: options.frames.is_none(),
         tested: Tested::of(dataset, estimated, &frames(&observed, &estimated.model, options)?),
         tolerance_mm: options.tolerance_mm,
-        decision: Decision::of(groups.len(), model.max, (uncertainty_mm, uncertainty), options.tolerance_mm),
+        uncounted: uncounted(&observed, &counted),
+        decision: Decision::of(tested_poses, model.max, (uncertainty_mm, uncertainty), options.tolerance_mm),
         orientation,
         orientation_asked: options.tolerance_rad.is_some(),
         cycles: cycles(&observed, &groups, &estimated.model, options)?,
@@ -284,7 +294,40 @@ fn is_of_the_fit(dataset: &Dataset, estimated: &Estimated) -> bool {
 
 /// The errors of each row, of position (mm) and orientation (rad; none if none was measured), with frames fitted without
 /// the row.
-fn errors(observed: &Observations, model: &Model, options: &Options) -> Result<[Vec<f64>; 2], StartError> {
+fn errors(observed: &Observations, model: &Model, options: &Options) -> Result<RowErrors, StartError> {
+    if options.frames.is_none() && observed.dataset.stations() > 1 {
+        let StationErrors { mm, rad } = StationErrors::of(observed, model)?;
+        return Ok(RowErrors { mm, rad });
+    }
+    let [mm, rad] = errors_of_one_station(observed, model, options)?;
+    Ok(RowErrors { mm: mm.into_iter().map(Some).collect(), rad })
+}
+
+/// Errors of each row: of position (mm), `None` where it does not count, and of orientation (rad; none if none was measured).
+struct RowErrors {
+    mm: Vec<Option<f64>>,
+    rad: Vec<f64>,
+}
+
+impl RowErrors {
+    /// Those of the rows that count.
+    fn at(&self, counted: &[usize]) -> [Vec<f64>; 2] {
+        let rad = counted.iter().filter_map(|&row| self.rad.get(row).copied()).collect();
+        [counted.iter().filter_map(|&row| self.mm[row]).collect(), rad]
+    }
+}
+
+/// The rows that count for both arms.
+fn counted(nominal: &RowErrors, found: &RowErrors) -> Vec<usize> {
+    (0..found.mm.len()).filter(|&row| nominal.mm[row].is_some() && found.mm[row].is_some()).collect()
+}
+
+/// The same with one frame for all, or with stated ones.
+fn errors_of_one_station(
+    observed: &Observations,
+    model: &Model,
+    options: &Options,
+) -> Result<[Vec<f64>; 2], StartError> {
     let count = observed.dataset.rows.len();
     if let Some(frames) = &options.frames {
         let rows: Vec<usize> = (0..count).collect();

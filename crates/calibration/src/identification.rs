@@ -13,6 +13,7 @@ pub mod solver;
 pub mod fit;
 pub mod start;
 pub(crate) mod parameter_table;
+pub mod repeats;
 mod sessions;
 pub(crate) mod misreading;
 pub(crate) mod rigid_motion_columns;

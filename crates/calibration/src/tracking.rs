@@ -54,6 +54,7 @@ mod bounds;
 mod departure;
 mod error;
 mod first_noise;
+pub mod gain;
 mod gauge;
 mod last_link;
 pub mod locate;

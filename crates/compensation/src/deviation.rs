@@ -198,8 +198,28 @@ pub struct PathReport {
     /// What the rewritten program has differently from the original beyond moved and inserted targets, each with its lines: with any of
     /// these, the deviations after are not those of a corrected program.
     pub differences: Vec<String>,
+    /// The path of the rewritten program between its targets; absent where there is no rewritten program.
+    pub between: Option<BetweenTargets>,
     /// Held-out error of the model [mm RMSE], where it has one.
     pub held_out_mm: Option<f64>,
+}
+
+/// The path of a rewritten program between the targets of the original.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BetweenTargets {
+    /// Largest deviation from the intended line or arc that a correction leaves between two targets (mm).
+    pub tolerance_mm: f64,
+    /// Largest deviation of a corrected line or arc from the intended one through its ends as reached (mm); infinite where the arm cannot
+    /// follow; `None` where none was checked.
+    pub largest_mm: Option<f64>,
+    /// Lines and arcs that deviate by more than the tolerance.
+    pub beyond: usize,
+    /// Their lines, the first few.
+    pub beyond_lines: Option<String>,
+    /// Corrected lines and arcs that start at a place that is unknown or not corrected: the path to their end is not checked.
+    pub unchecked: usize,
+    /// Their lines, the first few.
+    pub unchecked_lines: Option<String>,
 }
 
 /// A motion of which a report has no point: the program text does not tell where it leads, or the arm does not reach it.
@@ -307,6 +327,11 @@ impl PathReport {
     /// Signed deviations of the cut points that have one, before or after.
     pub fn signed_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Vec<f64> {
         self.cut().filter_map(|p| which(p).map(|d| d.signed_mm())).collect()
+    }
+
+    /// The largest angle between intended and reached orientation over the cut (rad).
+    pub fn largest_turn_rad(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
+        self.cut().filter_map(|point| which(point).map(|deviation| deviation.angle_rad)).reduce(f64::max)
     }
 
     /// Root mean square of the predicted 1σ over the cut (mm); `None` where no point has one.

@@ -4,14 +4,18 @@
 //! those joints, arriving from their backlash sides. Intended poses come from the original program.
 
 mod alignment;
+mod between_targets;
 mod differences;
 mod executed_end;
+mod kept_placement;
 
 use nalgebra::{Point3, Vector3};
 
 use self::alignment::align;
+use self::between_targets::Followed;
 use self::differences::Compared;
 use self::executed_end::{ExecutedEnd, by_motion};
+use self::kept_placement::KeptPlacement;
 use crate::arms::Arms;
 use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
@@ -20,6 +24,7 @@ use crate::deviation::{
 };
 use crate::frames::frame_table::FrameTable;
 use crate::plan::reason::OutcomeReason;
+use crate::segment::condition_schedule::ConditionSchedule;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_arm::model::{Joints, Model};
@@ -69,13 +74,28 @@ pub struct VerificationTask<'a> {
     pub name: &'a str,
     /// What "after" means.
     pub after: After,
+    /// Largest deviation of the path between two targets from the intended one (mm), as in
+    /// [`Options::tolerance_mm`](crate::options::Options::tolerance_mm).
+    pub tolerance_mm: f64,
     /// Payloads that the two programs state; absent where the payload of the condition applies throughout.
     pub loads: [Option<&'a Loads>; 2],
+}
+
+/// A program that was run.
+struct Run {
+    /// In the order of the motions.
+    ends: Vec<ExecutedEnd>,
+    /// The motions without an end, with the reason.
+    without_end: Vec<(u32, OutcomeReason)>,
+    frame_table: FrameTable,
+    /// The conditions on the way to each motion; empty where none changes on the way.
+    schedules: Vec<ConditionSchedule>,
 }
 
 /// The rewritten program and its ends, by motion.
 struct RewrittenRun<'a> {
     listing: &'a Listing,
+    run: &'a Run,
     ends: Vec<Option<&'a ExecutedEnd>>,
     /// The rewritten motion of each original one.
     partners: Vec<Option<usize>>,
@@ -85,33 +105,40 @@ struct RewrittenRun<'a> {
 pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathReport {
     let mut arms = Arms::simulated(acting_arm.nominal, acting_arm.model, &acting_arm.condition);
     arms.knowledge = acting_arm.knowledge;
-    let (before, without_end) = run(task.original, task.loads[0], None, &mut arms, task.cell);
+    let Run { ends: before, without_end, .. } = run(task.original, task.loads[0], None, &mut arms, task.cell);
     // Where no word states the configuration, the arm starts both in the same one.
     let start = before.first().map(|end| end.joints);
     let after =
-        task.rewritten.map(|listing| (listing, run(listing, task.loads[1], start, &mut arms, task.cell).0));
+        task.rewritten.map(|listing| (listing, run(listing, task.loads[1], start, &mut arms, task.cell)));
     let ends = by_motion(&before, task.original.motions.len());
     let after = after.as_ref().map(|(listing, after)| {
-        let after = by_motion(after, listing.motions.len());
-        RewrittenRun { listing, partners: align(&ends, &after), ends: after }
+        let of_motions = by_motion(&after.ends, listing.motions.len());
+        RewrittenRun { listing, run: after, partners: align(&ends, &of_motions), ends: of_motions }
     });
     let differences =
-        after.as_ref().map_or_else(Vec::new, |RewrittenRun { listing, ends: after, partners }| {
+        after.as_ref().map_or_else(Vec::new, |RewrittenRun { listing, ends: after, partners, .. }| {
             let configuration = |joints: &Joints| {
                 let found = arms.nominal.configuration(joints);
                 [found.cf1, found.cf4, found.cf6]
             };
             let configuration = &configuration;
+            let placements = &KeptPlacement::all(task.original, partners, &ends, after);
             Compared {
                 original: task.original,
                 rewritten: listing,
                 partners,
                 before: &ends,
                 after,
+                placements,
                 configuration,
             }
             .differences()
         });
+    let between = after.as_ref().map(|RewrittenRun { listing, run, ends: after, partners }| {
+        let (original, before) = (task.original, &ends);
+        Followed { original, rewritten: listing, partners, before, after, run, is_same: &is_same_target }
+            .judged(&arms, task.tolerance_mm)
+    });
     let points = before.iter().enumerate().map(|(index, first)| {
         checkpoint();
         let second = after.as_ref().and_then(|after| after.ends[after.partners[first.motion]?]);
@@ -129,6 +156,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
             Some((Status::Left, Some(reason.to_string())))
         }),
         differences,
+        between,
         held_out_mm: acting_arm.knowledge.map(|k| k.geometry.held_out.rmse),
     }
 }
@@ -186,7 +214,7 @@ fn is_same_target(first: &ExecutedEnd, second: &ExecutedEnd) -> bool {
     moved < 1e-9 && turned < 1e-9 && (first.joints - second.joints).amax() < 1e-9
 }
 
-/// Runs a program: the ends in the order of the motions, and the motions without one with the reason. `start` are the joints where it
+/// Runs a program. `start` are the joints where it
 /// begins, unless cell file or program state them.
 fn run(
     listing: &Listing,
@@ -194,7 +222,7 @@ fn run(
     start: Option<Joints>,
     arms: &mut Arms<'_>,
     cell: &Cell,
-) -> (Vec<ExecutedEnd>, Vec<(u32, OutcomeReason)>) {
+) -> Run {
     let frame_table = FrameTable::of(listing, arms, cell, loads.is_some()).starting_at(start);
     let mut sent: Vec<CommandedEnd> = Vec::new();
     let mut without_end = Vec::new();
@@ -213,7 +241,7 @@ fn run(
             Err(reason) => without_end.push((index as u32, reason)),
         }
     }
-    let condition_indices = condition_indices(listing, loads, &sent, arms, &frame_table);
+    let (condition_indices, schedules) = condition_indices(listing, loads, &sent, arms, &frame_table);
     let joints: Vec<Joints> = sent.iter().map(|s| s.joints).collect();
     let flanges = arms.conditions.forward(&condition_indices, &joints);
     let ways = on_the_way(listing, &sent, &condition_indices, arms, &frame_table);
@@ -222,6 +250,7 @@ fn run(
             let frames = &frame_table.list[sent.frames_index];
             ExecutedEnd {
                 motion: sent.motion,
+                frames_index: sent.frames_index,
                 commanded: sent.commanded,
                 joints: sent.joints,
                 reached: frames.real.target_of(&flange),
@@ -233,7 +262,7 @@ fn run(
             }
         },
     );
-    (ends.collect(), without_end)
+    Run { ends: ends.collect(), without_end, frame_table, schedules }
 }
 
 /// See [`ExecutedEnd::on_the_way`]. The controller moves to joints in proportion from those of the motion before.
@@ -268,18 +297,19 @@ fn on_the_way(
     (0..sent.len()).map(of).collect()
 }
 
-/// Condition under which the arm arrives at each end.
+/// Condition under which the arm arrives at each end, and those on the way to each motion.
 fn condition_indices(
     listing: &Listing,
     loads: Option<&Loads>,
     sent: &[CommandedEnd],
     arms: &mut Arms<'_>,
     frame_table: &FrameTable,
-) -> Vec<usize> {
+) -> (Vec<usize>, Vec<ConditionSchedule>) {
     let loads = arms.loads(listing, loads);
     let load = |motion: usize| loads.get(motion).and_then(Option::as_ref);
     if !arms.conditions.has_play() {
-        return sent.iter().map(|s| arms.conditions.condition_index([0; 6], load(s.motion))).collect();
+        let alike = sent.iter().map(|s| arms.conditions.condition_index([0; 6], load(s.motion)));
+        return (alike.collect(), Vec::new());
     }
     let mut stops: Vec<MotionEnd<'_>> = listing
         .motions
@@ -303,9 +333,13 @@ fn condition_indices(
     let commanded = |frames_index: usize| frame_table.list[frames_index].commanded;
     let backlash_sides =
         backlash_sides(&stops, &before, &arms.nominal, &arms.conditions.play_rad, &commanded, &[]);
-    sent.iter()
-        .map(|s| arms.conditions.condition_index(backlash_sides[s.motion].end, load(s.motion)))
-        .collect()
+    let schedules = backlash_sides.iter().enumerate().map(|(motion, sides)| {
+        ConditionSchedule::of(sides, |sides| arms.conditions.condition_index(sides, load(motion)))
+    });
+    let schedules = schedules.collect();
+    let arrives =
+        |s: &CommandedEnd| arms.conditions.condition_index(backlash_sides[s.motion].end, load(s.motion));
+    (sent.iter().map(arrives).collect(), schedules)
 }
 
 fn commanded_end(

@@ -386,6 +386,7 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
         program: shop.name,
         name: &format!("{id} {}", solver.name),
         after: shop.after,
+        tolerance_mm: RewriteBounds::default().tolerance_mm,
         loads: [None, None],
     };
     let acting =

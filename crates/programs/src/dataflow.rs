@@ -9,26 +9,11 @@
 //! Method: monotone frameworks (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999, §2.4 and §6.1).
 
 mod graph;
+mod lattice;
 mod passes;
 mod walk;
 
 pub(crate) use graph::{Edge, post_order, propagate};
+pub(crate) use lattice::Lattice;
 pub(crate) use passes::{Arrivals, read_until_stable};
 pub(crate) use walk::{Control, Nesting, Transfer};
-
-/// Facts that hold on several paths: an element of a join semi-lattice.
-pub(crate) trait Lattice: Clone {
-    /// Joins the facts of another path.
-    fn join(&mut self, other: &Self);
-}
-
-/// `None`: nothing arrives here.
-impl<F: Lattice> Lattice for Option<F> {
-    fn join(&mut self, other: &Self) {
-        match (self, other) {
-            (Some(fact), Some(other)) => fact.join(other),
-            (this @ None, other) => this.clone_from(other),
-            (Some(_), None) => {}
-        }
-    }
-}

@@ -508,8 +508,11 @@ pub struct Listing {
     /// later one, sorted.
     pub across_calls: Vec<[u32; 2]>,
     /// All motions from which one without [`Motion::previous`] may begin, where these are known: behind branches, in loops, and
-    /// across calls (RAPID).
+    /// across calls.
     pub predecessors: BTreeMap<u32, Vec<u32>>,
+    /// Where the program decides by the position that the robot reads (CRobT) and may stand at the end of a motion that is corrected all the
+    /// same (RAPID).
+    pub position_decisions: Vec<Place>,
     /// Regions that could not be parsed.
     pub opaque: Vec<OpaqueRegion>,
     /// The marks of earlier compensations, per file.
@@ -535,6 +538,8 @@ pub struct NcFacts {
     pub other_axes: BTreeMap<char, Place>,
     /// Motions that call a program outside their file (NC).
     pub external_calls: Vec<u32>,
+    /// Motions behind a label, a jump, a call or a loop that are left because words are missing there, with these words.
+    pub unstated: BTreeMap<u32, String>,
 }
 
 /// An offset of a target by persistent data, which stay on the controller when the program ends: an operator or another task may change

@@ -10,7 +10,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_calibration::acceptance::orientation::Orientation;
 use truegrind_calibration::acceptance::path::{PATH_CYCLES, PATH_POINTS, PathFound};
 use truegrind_calibration::acceptance::{
-    Acceptance, Decision, FEWEST_POSES, ISO_CYCLES, ISO_POSES, LEAST_SHARE, Uncertainty,
+    Acceptance, Decision, FEWEST_POSES, ISO_CYCLES, ISO_POSES, LEAST_SHARE, Uncertainty, Uncounted,
 };
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind_math::statistics::ErrorSummary;
@@ -105,6 +105,7 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
     }
     reasons.extend(orientation_reason(found));
     reasons.push(tested(found));
+    reasons.extend(found.uncounted.map(uncounted));
     if found.is_registered {
         reasons.push(
             "the placement of the base and the flange was not tested: the sensor was registered with these poses; state --sensor-frame to \
@@ -153,6 +154,19 @@ fn digits(mm: f64) -> usize {
 /// A length (mm) with as many digits as show it.
 fn length(mm: f64) -> String {
     format!("{mm:.*}", digits(mm))
+}
+
+/// That small stations show nothing of the arm.
+fn uncounted(left: Uncounted) -> String {
+    let Uncounted { rows, stations, of_stations } = left;
+    let whole = match stations {
+        0 => String::new(),
+        stations => format!(", all those of {stations} of the {of_stations} stations among them"),
+    };
+    format!(
+        "{rows} rows do not count{whole}: their stations have too few poses, so that the frame of the station follows an error there; measure \
+         at least 10 poses from each station"
+    )
 }
 
 /// What the poses show of the arm.
@@ -625,6 +639,9 @@ pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, statem
         "tolerance_mm": found.tolerance_mm,
         "uncertainty": { "expanded_mm": (found.uncertainty != Uncertainty::Unknown).then_some(found.uncertainty_mm), "from": uncertainty },
         "poses": found.poses,
+        "uncounted": found.uncounted.map(|left| json!({
+            "rows": left.rows, "stations": left.stations, "of_stations": left.of_stations,
+        })),
         "coverage": found.coverage.map(|c| json!({
             "joint": c.joint + 1, "tested_deg": c.tested_deg, "fitted_deg": c.fitted_deg,
         })),

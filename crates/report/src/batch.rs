@@ -1,6 +1,6 @@
 //! Report over many programs: one row per program, totals, and failures.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -78,6 +78,9 @@ pub struct Row {
     /// How its stationary work objects with corrected motions are placed.
     #[serde(default)]
     pub placed: Vec<Placed>,
+    /// Routines with motions that it declares, and those that it calls and does not declare, in lower case.
+    #[serde(default)]
+    pub routines: [Vec<String>; 2],
 }
 
 impl Row {
@@ -110,6 +113,10 @@ impl Row {
             reason: most_frequent_reason(plan),
             shape_only: most.is_some_and(|most| most.shape_only),
             placed: placement::placed(plan, listing),
+            routines: [
+                sorted_names(listing.routines.iter().map(|routine| routine.name.as_str())),
+                sorted_names(listing.outside_calls.iter().map(|call| call.name.as_str())),
+            ],
         }
     }
 
@@ -129,6 +136,7 @@ impl Row {
             reason: None,
             shape_only: false,
             placed: Vec::new(),
+            routines: Default::default(),
         }
     }
 
@@ -153,7 +161,8 @@ impl Row {
     /// Whether the program may run without a check.
     fn is_clean(&self) -> bool {
         let [all, _, flagged, refused, _] = self.motions;
-        let rewritten = matches!(self.ended, Ended::Changed) || all == 0 && self.ended == Ended::Unchanged;
+        let is_empty = all == 0 && self.opaque == 0;
+        let rewritten = self.ended == Ended::Changed || is_empty && self.ended == Ended::Unchanged;
         rewritten && flagged + refused == 0 && self.doubt.is_none()
     }
 
@@ -161,6 +170,45 @@ impl Row {
     pub fn covered_percent(&self) -> Option<f64> {
         let [all, changed, flagged, ..] = self.motions;
         (all > 0).then(|| 100.0 * (changed + flagged) as f64 / all as f64)
+    }
+}
+
+/// What a run leaves to be checked or done, for its headline.
+struct Open {
+    /// Programs with corrections that may not run unchecked, or in which nothing is corrected.
+    programs: usize,
+    /// Programs that are already corrected, and in which nothing was written.
+    already: usize,
+    /// Refused and flagged motions.
+    motions: usize,
+}
+
+impl Open {
+    fn of(rows: &[Row]) -> Self {
+        let [_, _, flagged, refused, _] = totals(rows);
+        let is_open = |row: &&Row| matches!(row.ended, Ended::Changed | Ended::Unchanged) && !row.is_clean();
+        Self {
+            programs: rows.iter().filter(is_open).count(),
+            already: rows.iter().filter(|row| row.ended == Ended::Already).count(),
+            motions: flagged + refused,
+        }
+    }
+
+    fn is_any(&self) -> bool {
+        self.programs + self.already > 0
+    }
+
+    /// What is to be checked, beside so many programs that may run.
+    fn check(&self, may_run: usize, of: &str) -> String {
+        let are = if may_run == 1 { "is" } else { "are" };
+        let runs = format!("{may_run} {of} {are} corrected and may run");
+        let which = if self.motions == 0 { "left" } else { "refused, flagged or left" };
+        match (self.programs, may_run) {
+            (0, _) if self.already > 0 => format!("{runs}; the rest is already corrected"),
+            (0, _) => runs,
+            (_, 0) => format!("check the motions that are {which} before running any of them"),
+            _ => format!("{runs}; check the motions that are {which} in the rest first"),
+        }
     }
 }
 
@@ -381,30 +429,15 @@ fn title(rows: &[Row]) -> String {
 
 fn verdict(rows: &[Row]) -> Verdict {
     let failed: Vec<&Row> = rows.iter().filter(|row| row.ended == Ended::Failed).collect();
-    let [_, changed, flagged, refused, _] = totals(rows);
+    let [_, changed, flagged, ..] = totals(rows);
     let may_run = rows.iter().filter(|row| row.ended == Ended::Changed && row.is_clean()).count();
-    let doubtful = rows.iter().filter(|row| row.doubt.is_some()).count();
-    let apart = placed_apart(rows);
-    let status = match (failed.len(), flagged + refused + doubtful + apart.len()) {
-        (0, _) if changed + flagged == 0 => Status::NotEvaluated,
-        (0, 0) => Status::Good,
-        (0, _) => Status::Warning,
+    let (open, apart) = (Open::of(rows), placed_apart(rows));
+    // The same as of the exit code: a program in which nothing is corrected makes the parts that it always made.
+    let status = match failed.len() {
+        0 if changed + flagged == 0 => Status::NotEvaluated,
+        0 if open.is_any() || !apart.is_empty() => Status::Warning,
+        0 => Status::Good,
         _ => Status::Bad,
-    };
-    let first = |of: &str| match may_run {
-        0 if doubtful > 0 => {
-            "check the motions that are refused, flagged or left before running any of them".to_owned()
-        }
-        0 => "check the refused and flagged motions before running any of them".to_owned(),
-        _ => {
-            let which = if doubtful > 0 {
-                "motions that are refused, flagged or left in"
-            } else {
-                "refused and flagged motions of"
-            };
-            let are = if may_run == 1 { "is" } else { "are" };
-            format!("{may_run} {of} {are} corrected and may run; check the {which} the rest first")
-        }
     };
     let headline = match status {
         Status::NotEvaluated => "Nothing was corrected".to_owned(),
@@ -412,23 +445,24 @@ fn verdict(rows: &[Row]) -> Verdict {
             let are = if may_run == 1 { "is" } else { "are" };
             format!("All programs were processed; {may_run} of {} {are} corrected and may run", rows.len())
         }
-        Status::Warning if flagged + refused + doubtful == 0 => {
+        Status::Warning if !open.is_any() => {
             "All programs were processed, but what they make on one workpiece shifts against each other"
                 .to_owned()
         }
         Status::Warning | Status::Found => {
-            format!("All programs were processed; {}", first(&format!("of {}", rows.len())))
+            format!("All programs were processed; {}", open.check(may_run, &format!("of {}", rows.len())))
         }
         Status::Bad => {
             format!(
                 "{} of {} programs could not be processed; {}",
                 failed.len(),
                 rows.len(),
-                first("of the others")
+                open.check(may_run, "of the others")
             )
         }
     };
     let mut reasons = vec![sum(rows)];
+    reasons.extend(shape_alone(rows));
     reasons.extend(apart);
     let names: Vec<&str> = rows.iter().map(|row| row.file.as_str()).collect();
     let folder = shared_folder(&names).unwrap_or_default();
@@ -458,6 +492,61 @@ fn verdict(rows: &[Row]) -> Verdict {
         ));
     }
     Verdict::new(status, headline, reasons)
+}
+
+/// Names in lower case, each once.
+fn sorted_names<'n>(names: impl Iterator<Item = &'n str>) -> Vec<String> {
+    let names: BTreeSet<String> = names.map(str::to_ascii_lowercase).collect();
+    names.into_iter().collect()
+}
+
+/// Makes corrected programs doubtful whose routines another program of the run calls: they were read as if a displacement, a load or a tool
+/// of the caller did not hold there. Whether there are any.
+pub fn doubt_called(rows: &mut [Row]) -> bool {
+    let mut callers: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (index, row) in rows.iter().enumerate() {
+        row.routines[1].iter().for_each(|name| callers.entry(name.clone()).or_default().push(index));
+    }
+    if callers.is_empty() {
+        return false;
+    }
+    let files: Vec<String> = rows.iter().map(|row| row.file.clone()).collect();
+    let mut found = false;
+    for (index, row) in rows.iter_mut().enumerate().filter(|(_, row)| row.ended == Ended::Changed) {
+        let called = row.routines[0].iter().filter_map(|name| {
+            let caller = callers.get(name)?.iter().find(|caller| **caller != index)?;
+            Some((name, &files[*caller]))
+        });
+        let Some((name, caller)) = called.min_by_key(|(_, caller)| *caller) else { continue };
+        let caller = caller.rsplit(['/', '\\']).next().unwrap_or(caller);
+        row.doubt = Some(format!(
+            "{caller} calls {name}: what holds there (displacement, load, tools) was not read. Give the modules of one task together (--together)"
+        ));
+        found = true;
+    }
+    found
+}
+
+/// Programs of which the shape alone is corrected, with their work objects: their paths stay as far off as a whole as they were.
+fn shape_alone(rows: &[Row]) -> Option<String> {
+    let corrected = || rows.iter().filter(|row| row.ended == Ended::Changed && !row.placed.is_empty());
+    let kept: Vec<&Row> =
+        corrected().filter(|row| row.placed.iter().any(|placed| placed.shape_only)).collect();
+    let objects: BTreeSet<&str> = kept
+        .iter()
+        .flat_map(|row| row.placed.iter().filter(|placed| placed.shape_only))
+        .map(|placed| placed.name.as_str())
+        .collect();
+    let named: Vec<&str> = objects.iter().copied().take(MAX_APART).collect();
+    let more = if objects.len() > MAX_APART { " and others" } else { "" };
+    (!kept.is_empty()).then(|| {
+        format!(
+            "shape only in {} of {} corrected programs ({}{more}): the shape of their paths is corrected, not their placement (--placement)",
+            kept.len(),
+            corrected().count(),
+            named.join(BETWEEN)
+        )
+    })
 }
 
 /// Whether parts of one workpiece shift against each other, since some programs keep their placement and others correct it.
@@ -512,9 +601,10 @@ pub fn json(rows: &[Row], programs: Vec<Value>) -> Value {
         .filter(|row| row.ended == Ended::Failed)
         .map(|row| json!({ "file": row.file, "error": row.note }))
         .collect();
-    let totals = totals(rows);
+    let (totals, verdict) = (totals(rows), verdict(rows));
     json!({
         "schema": "truegrind.compensation/1",
+        "verdict": { "status": verdict.status.word(), "headline": verdict.headline },
         "programs": programs,
         "failed": failed,
         "totals": {

@@ -176,8 +176,10 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
         })
         .collect();
     let [placements, cuts] = placement::json(plan, listing);
+    let verdict = verdict(plan, listing, is_written(files));
     json!({
         "schema": "truegrind.compensation/1",
+        "verdict": { "status": verdict.status.word(), "headline": verdict.headline },
         "programs": programs,
         "placements": placements,
         "cuts": cuts,

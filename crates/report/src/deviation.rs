@@ -124,6 +124,7 @@ fn point_columns((word, key): (&str, &str), decimals: usize, file: bool) -> Vec<
                 decimals,
             ));
         }
+        columns.push(Column::number(format!("{key}_turn_deg"), format!("{side} turn"), "°", 4));
     }
     columns.extend([
         Column::number("sigma_mm", "predicted 1σ", "mm", 3),
@@ -144,8 +145,9 @@ fn point_cells(point: &PathPoint) -> Vec<Cell> {
                 d.vector_mm.z.into(),
                 d.norm_mm().into(),
                 d.normal_mm.into(),
+                d.angle_rad.to_degrees().into(),
             ],
-            None => [const { Cell::Missing }; 5],
+            None => [const { Cell::Missing }; 6],
         });
     }
     let [sigma, status, reason] = outcome(point);
@@ -156,8 +158,8 @@ fn point_cells(point: &PathPoint) -> Vec<Cell> {
 /// The row of a motion without a point, in the columns of [`point_cells`].
 fn missing_cells(motion: &MissingMotion) -> Vec<Cell> {
     let mut row = vec![Cell::Missing, (motion.line as usize).into(), motion.instruction.as_str().into()];
-    // Three coordinates, two deviations of five numbers, σ and what it is of.
-    row.extend([const { Cell::Missing }; 15]);
+    // Three coordinates, two deviations of six numbers, σ and what it is of.
+    row.extend([const { Cell::Missing }; 17]);
     row.extend([status_cell(motion.status), motion.reason.clone().into()]);
     row
 }
@@ -184,6 +186,7 @@ pub fn short_table(report: &PathReport) -> Table {
                 decimals,
             ));
         }
+        columns.push(Column::number(format!("{key}_turn_deg"), format!("{side} turn"), "°", 3));
     }
     columns.push(Column::number("sigma_mm", "1σ", "mm", 3));
     columns.push(Column::text("status", "Status"));
@@ -196,6 +199,7 @@ pub fn short_table(report: &PathReport) -> Table {
             if normals {
                 row.push(side.and_then(|d| d.normal_mm).into());
             }
+            row.push(side.map(|d| d.angle_rad.to_degrees()).into());
         }
         row.extend(outcome(point));
         table.push(row);
@@ -395,6 +399,7 @@ fn model_json(report: &PathReport) -> Value {
                 "standard_deviation_mm": block.all.standard_deviation,
                 "rmse_mm": block.all.rmse,
                 "max_mm": block.all.max,
+                "max_turn_deg": report.largest_turn_rad(side).map(f64::to_degrees),
                 "points": block.all.count,
                 "registered_rms_mm": report.registered_rms_mm(side),
             })
@@ -405,6 +410,14 @@ fn model_json(report: &PathReport) -> Value {
         "after_is": report.after,
         "model_held_out_rmse_mm": report.held_out_mm,
         "differences": report.differences,
+        "between_targets": report.between.as_ref().map(|between| json!({
+            "tolerance_mm": between.tolerance_mm,
+            "largest_mm": between.largest_mm.filter(|mm| mm.is_finite()),
+            "beyond_tolerance": between.beyond,
+            "beyond_tolerance_lines": between.beyond_lines,
+            "unchecked": between.unchecked,
+            "unchecked_lines": between.unchecked_lines,
+        })),
         "summary": { "before": block(BEFORE), "after": block(AFTER) },
         "points": points,
     })

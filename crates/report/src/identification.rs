@@ -13,10 +13,11 @@ use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
 use super::number::Precision;
 use super::status::Status;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
+use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::identification::benefit::Benefit;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::identification::verdict::{CONVERGED, NO_LIMITS, percent_of};
+use truegrind_calibration::identification::verdict::{CONVERGED, NO_LIMITS, NOT_NOISE, percent_of};
 use truegrind_calibration::measurement::dataset::Dataset;
 
 pub use tables::{
@@ -218,9 +219,20 @@ pub fn judged(estimated: &Estimated) -> Verdict {
     let (before, after) = (estimated.registered.held_out.rmse, estimated.geometry.held_out.rmse);
     // A diagnosis has a second held-out error beside it: that of the fit with all causes.
     let of = if estimated.provenance.method == "diagnose" { " of the written arm" } else { "" };
+    let place = if shows_no_target(estimated) {
+        "; errors are those of the target, whose place on the flange these poses do not show, and a tool elsewhere may be off by more"
+    } else {
+        ""
+    };
     let errors =
-        format!("held-out error{of} {after:.3} mm RMSE, {before:.3} mm with registered frames alone");
+        format!("held-out error{of} {after:.3} mm RMSE, {before:.3} mm with registered frames alone{place}");
     let (status, headline) = match estimated.verdict.status {
+        Judgement::Pass if shows_more_than_noise(estimated) => (
+            Status::Warning,
+            format!(
+                "The model may be used and meets the stated limits, but repeated poses show more than the noise of a reading: {errors}"
+            ),
+        ),
         Judgement::Pass => {
             (Status::Good, format!("The model may be used; it meets the stated limits: {errors}"))
         }
@@ -228,6 +240,12 @@ pub fn judged(estimated: &Estimated) -> Verdict {
         Judgement::Doubtful => {
             (Status::Warning, format!("The model is doubtful and needs --allow-doubtful: {errors}"))
         }
+        Judgement::NotEvaluated if shows_more_than_noise(estimated) => (
+            Status::Warning,
+            format!(
+                "The model may be used, but repeated poses show more than the noise of a reading: {errors}"
+            ),
+        ),
         Judgement::NotEvaluated => (
             Status::Good,
             format!(
@@ -236,7 +254,7 @@ pub fn judged(estimated: &Estimated) -> Verdict {
         ),
     };
     let mut reasons = estimated.verdict.reasons.clone();
-    if status == Status::Good {
+    if matches!(estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated) {
         // The headline says what limits were stated, and an arm that may be used has converged.
         reasons.retain(|reason| !reason.ends_with(CONVERGED) && reason != NO_LIMITS);
         reasons.push(
@@ -245,6 +263,20 @@ pub fn judged(estimated: &Estimated) -> Verdict {
         );
     }
     Verdict::new(status, headline, reasons)
+}
+
+/// Whether its verdict notes that repeated poses show more than noise.
+fn shows_more_than_noise(estimated: &Estimated) -> bool {
+    estimated.verdict.reasons.iter().any(|reason| reason.starts_with(NOT_NOISE))
+}
+
+/// Whether its verdict notes that the poses do not show where the target sits.
+fn shows_no_target(estimated: &Estimated) -> bool {
+    estimated
+        .verdict
+        .reasons
+        .iter()
+        .any(|reason| reason.contains("do not show where the target sits on the flange"))
 }
 
 /// Expected deviation of programs before and after correction.
@@ -273,6 +305,16 @@ fn programs_after(benefit: &Benefit) -> KeyFigure {
     ))
 }
 
+/// Why the noise of the sensor is unknown: repetitions from another station or another side are no repetitions.
+fn too_few_repeats(found: &Identification) -> String {
+    let is_of_stations = |parameter: &Parameter| matches!(parameter, Parameter::Disturbance { .. });
+    let has_stations = found.geometry.parameters.iter().any(is_of_stations);
+    format!(
+        "too few poses were repeated from {}",
+        if has_stations { "the same station and the same sides" } else { "the same sides" }
+    )
+}
+
 fn key_figures(found: &Identification) -> Vec<KeyFigure> {
     let estimated = &found.estimated;
     let (before, after) = (&estimated.registered.held_out, &estimated.geometry.held_out);
@@ -289,11 +331,16 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
         KeyFigure::new("Largest held-out error", after.max, 3, "mm")
             .note(format!("registered: {:.3} mm", before.max)),
         match (estimated.noise_floor_mm, estimated.beyond_noise_mm) {
+            (Some(_), Some(_)) if shows_more_than_noise(estimated) => {
+                floor.note("scatter of repeated poses, without what they show beside noise")
+            }
+            (None, Some(_)) => floor.note("unknown: repeated poses show more than the noise of a reading"),
             (Some(_), Some(_)) => floor.note("scatter of repeated poses"),
-            (Some(_), None) => floor.note(
-                "of rounding alone; that of the sensor is not known, since too few poses were repeated from the same sides",
-            ),
-            (None, _) => floor.note("unknown: too few poses were repeated from the same sides and nothing is rounded"),
+            (Some(_), None) => floor.note(format!(
+                "of rounding alone; that of the sensor is not known, since {}",
+                too_few_repeats(found)
+            )),
+            (None, None) => floor.note(format!("unknown: {} and nothing is rounded", too_few_repeats(found))),
         },
     ]);
     figures.extend(found.held_out_orientation.as_ref().map(|turns| {

@@ -8,6 +8,7 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::parameter::display_unit;
 use truegrind_calibration::tracking::alarm::Mount;
+use truegrind_calibration::tracking::gain::Gain;
 use truegrind_calibration::tracking::state::ConsumedFile;
 use truegrind_calibration::tracking::{Alarm, Departure, Tracker};
 use truegrind_math::statistics::median;
@@ -67,6 +68,10 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     let departed = departure.as_ref().filter(|departure| departure.is_significant);
     let set_aside = tracker.latest_set_aside();
     let (mut status, mut headline) = headline(tracker, fresh, alarms, departure.as_ref());
+    let gain = expected_gain(tracker, departure.as_ref()).filter(|_| status == Status::Good);
+    if let Some(gain) = &gain {
+        headline.push_str(&format!("; {}", gain_headline(gain)));
+    }
     let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
     let earlier = departed.filter(|_| alarms.is_empty()).and_then(reported);
     reasons.extend(earlier.map(|alarm| format!("reported in an earlier run: {alarm}")));
@@ -97,10 +102,44 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     } else if status == Status::Warning {
         reasons.push(what_to_do(departed).to_owned());
     }
+    reasons.extend(gain.as_ref().map(gain_sentence));
     reasons.extend(noise_sentences(tracker));
     page.push(Verdict::new(status, headline, reasons));
     page.push(key_figures(tracker, alarms.len(), departure.as_ref()));
     page.paragraph(format!("Model written: {model}"));
+}
+
+/// What programs would gain from the tracked model, though the arm did not change.
+struct ExpectedGain {
+    /// Error of programs corrected with the model in use and with the tracked one, over the measured region (mm).
+    programs_mm: [f64; 2],
+    /// What shows it.
+    shown: Gain,
+}
+
+/// The distance of the models is the error of the one in use, as far as the tracked one is right.
+fn expected_gain(tracker: &Tracker, departure: Option<&Departure>) -> Option<ExpectedGain> {
+    let now = departure?;
+    let shown = tracker.gain()?;
+    Some(ExpectedGain { programs_mm: [now.rms_mm.hypot(now.tracked_mm), now.tracked_mm], shown })
+}
+
+fn gain_headline(gain: &ExpectedGain) -> String {
+    let [in_use_mm, tracked_mm] = gain.programs_mm;
+    format!(
+        "corrected again with the tracked model they would be off by {tracked_mm:.3} instead of {in_use_mm:.3} mm"
+    )
+}
+
+fn gain_sentence(gain: &ExpectedGain) -> String {
+    let [in_use_mm, tracked_mm] = gain.programs_mm;
+    let Gain { poses, in_use_mm: in_use, tracked_mm: tracked, .. } = gain.shown;
+    format!(
+        "these poses decide what the fit of the model in use left open; the arm need not have changed. Programs that were corrected with it are \
+         off by {in_use_mm:.3} ± {tracked_mm:.3} mm RMS, placement of base and target excluded, and would be by {tracked_mm:.3} mm with the \
+         tracked model, beside what neither contains. Shown by {poses} poses before they were used: the tracked model predicted them to \
+         {tracked:.3} mm, the model in use fits them to {in_use:.3} mm. What to do: correct the original programs with the model written here"
+    )
 }
 
 /// Whether the programs remain valid.
@@ -410,6 +449,10 @@ pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
                 "since_first_poses_mm": since_mm, "since_first_poses_expected_mm": since_expected_mm,
             })
         }),
+        "gain": expected_gain(tracker, tracker.departure().as_ref()).map(|gain| json!({
+            "programs_in_use_mm": gain.programs_mm[0], "programs_tracked_mm": gain.programs_mm[1], "poses": gain.shown.poses,
+            "readings_in_use_mm": gain.shown.in_use_mm, "readings_tracked_mm": gain.shown.tracked_mm,
+        })),
         "noise": json!({
             "replaced_mm": tracker.replaced_noise_mm().map(|[_, before]| before),
             "smallest_change_mm": tracker.smallest_change_mm(),

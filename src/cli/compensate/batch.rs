@@ -189,7 +189,8 @@ impl BatchReports<'_> {
             programs.extend(done.json.unwrap_or_default());
             diff.extend_from_slice(&done.diff);
         }
-        let clean = clean && !batch::shifts_apart(&rows);
+        let is_called = batch::doubt_called(&mut rows);
+        let clean = clean && !is_called && !batch::shifts_apart(&rows);
         self.outputs.print(&batch::summary(&rows))?;
         self.outputs.add_made(
             &mut batch,

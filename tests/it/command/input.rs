@@ -308,6 +308,29 @@ fn a_mistake_that_explains_tracker_readings_is_named() {
     );
 }
 
+/// Points joined by time with clocks that differ by the time between two rows: it is the clocks, rather than a reading too many.
+#[test]
+fn clocks_that_differ_are_named_where_points_were_joined_by_time() {
+    let dir = folder();
+    let at = dir.path();
+    let text = include_str!("../../data/irb120-tracker.csv");
+    let time = |second: usize| format!("{:02}:{:02}:{:02}", 8 + second / 3600, second / 60 % 60, second % 60);
+    let (mut log, mut points) = ("time,q1,q2,q3,q4,q5,q6\n".to_owned(), "// Units: Millimeters\n".to_owned());
+    for (k, line) in text.lines().skip(1).enumerate() {
+        let cells: Vec<&str> = line.split(',').collect();
+        log += &format!("{},{}\n", time(20 * k), cells[..6].join(","));
+        points += &format!("Main p{k} {} 0.01 {}\n", cells[6..9].join(" "), time(20 * k + 20));
+    }
+    fs::write(at.join("log.csv"), log).unwrap();
+    fs::write(at.join("points.txt"), points).unwrap();
+    let joined =
+        ["identify", "log.csv", "--points", "points.txt", "--points-within", "2", "--robot", "abb-irb-120"];
+    let (code, out, err) = truegrind(at, &joined);
+    assert!(code == 2 && err.contains("--points-ahead"), "{out}{err}");
+    let (code, out, err) = truegrind(at, &[&joined[..], &["--points-ahead", "20"]].concat());
+    assert_eq!(code, 0, "{out}{err}");
+}
+
 /// A tracker that was set up elsewhere for the second half, which the column of this name tells.
 fn set_up_elsewhere(column: &str) -> Vec<Vec<String>> {
     let text = include_str!("../../data/irb120-tracker.csv");

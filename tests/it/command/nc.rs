@@ -5,6 +5,7 @@
 
 use std::fs;
 
+use super::shares::models;
 use super::{folder, truegrind};
 
 const PAGE: &str = include_str!("../../../docs/nc.md");
@@ -197,4 +198,37 @@ fn comments_that_misstate_are_errors_with_their_line() {
         code == 2 && said.contains("cell.toml") && said.contains("zyx") && said.contains("wpr"),
         "{said}"
     );
+}
+
+/// A Heidenhain program looks alike whether an operator starts it or another program calls it: what another of the run calls begins with
+/// the shifts of its caller, whoever reads it first.
+#[test]
+fn a_program_that_another_of_the_run_calls_is_no_main_program() {
+    let dir = folder();
+    let at = dir.path();
+    fs::copy(models().join("model.toml"), at.join("model.toml")).unwrap();
+    fs::write(at.join("cell.toml"), "[[tool]]\nname = \"T1\"\norigin = \"metrology\"\nposition_mm = [0, 0, 120]\n[[wobj]]\nname = \"G54\"\norigin = \"metrology\"\nposition_mm = [380, -20, 300]\n").unwrap();
+    let head = "; truegrind angles wpr\n1 TOOL CALL 1 Z S0\n";
+    let sub = format!(
+        "0 BEGIN PGM SUB MM\n{head}2 M128\n3 L X-20 Y-40 Z+20 A+180 B+0 C+0 R0 FMAX\n4 L X-20 Y-40 Z+0 F800\n5 L X+20 Y-40 Z+0\n6 END PGM SUB MM\n"
+    );
+    let main = format!(
+        "0 BEGIN PGM MAIN MM\n{head}2 CYCL DEF 7.0\n3 CYCL DEF 7.1 Z+100\n4 CALL PGM SUB.H\n5 M30\n6 END PGM MAIN MM\n"
+    );
+    let corrected = |folder: &str, with_main: bool| {
+        fs::create_dir_all(at.join(folder)).unwrap();
+        fs::write(at.join(folder).join("SUB.h"), &sub).unwrap();
+        if with_main {
+            fs::write(at.join(folder).join("MAIN.h"), &main).unwrap();
+        }
+        let out = format!("{folder}-out");
+        let (code, text, err) = truegrind(
+            at,
+            &["compensate", folder, "--model", "model.toml", "--cell", "cell.toml", "-o", &out],
+        );
+        assert!(code <= 1, "{text}{err}");
+        fs::read_to_string(at.join(out).join("SUB.h")).unwrap() != sub
+    };
+    assert!(corrected("alone", false));
+    assert!(!corrected("called", true));
 }

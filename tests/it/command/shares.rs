@@ -25,7 +25,7 @@ fn reports() -> Vec<String> {
 }
 
 /// Two models of one arm.
-fn models() -> &'static Path {
+pub(super) fn models() -> &'static Path {
     static MODELS: OnceLock<TempDir> = OnceLock::new();
     let made = MODELS.get_or_init(|| {
         let dir = folder();

@@ -323,7 +323,13 @@ pub(super) fn verbs() -> Vec<Verb> {
             ],
             outputs: &["--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
-            others: &[&ROBOT, &COMMON, &SHARES, &PROGRAMS, &["--model", "--intended", "--actual"]],
+            others: &[
+                &ROBOT,
+                &COMMON,
+                &SHARES,
+                &PROGRAMS,
+                &["--model", "--intended", "--actual", "--tolerance"],
+            ],
         },
     ]
 }

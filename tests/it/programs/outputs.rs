@@ -107,6 +107,33 @@ fn a_folder_is_done_in_parallel_past_what_cannot_be_done() {
     assert!(err.contains("failed: in/f.pgf") && err.contains("failed: in/g.nc"), "{err}");
 }
 
+/// A program in which nothing is corrected makes the parts that it always made: headline, pages, JSON and exit code say so alike.
+#[test]
+fn a_folder_with_a_program_that_stays_as_it_was_is_not_ok() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::create_dir_all(at.join("in")).unwrap();
+    fs::write(at.join("in/a.mod"), module("A", 5, 0.0)).unwrap();
+    let run = |out: &str| {
+        let arguments =
+            ["compensate", "in", "--model", "model.toml", "-o", out, "--json", "all.json", "--md", "all.md"];
+        let (code, text, err) = truegrind(at, &arguments);
+        let all = json(&fs::read_to_string(at.join("all.json")).unwrap());
+        let status = all["verdict"]["status"].as_str().unwrap_or_default().to_owned();
+        assert!(text.contains(&format!("[{status}]")), "{text}\n{err}");
+        assert!(
+            fs::read_to_string(at.join("all.md"))
+                .unwrap()
+                .contains(all["verdict"]["headline"].as_str().unwrap())
+        );
+        (code, status)
+    };
+    assert_eq!(run("alone"), (0, "ok".to_owned()));
+    // Nothing is refused or flagged: its tool is not in the text.
+    fs::write(at.join("in/b.mod"), module("B", 5, 0.0).replace("tool0", "tNowhere")).unwrap();
+    assert_eq!(run("both"), (1, "warning".to_owned()));
+}
+
 /// A controller backup holds a folder for each task: what one sets is not set in another, and one model is that of one arm.
 #[test]
 fn a_backup_is_read_by_tasks() {

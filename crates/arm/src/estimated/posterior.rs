@@ -24,6 +24,12 @@ impl Estimated {
         })
     }
 
+    /// For each parameter in order, whether the measurement gave less than half of what is known of it: the rest is its tolerance.
+    pub fn unseen(&self) -> Vec<bool> {
+        let of = |k: usize| self.parameters.get(k).is_some_and(|known| known.determined < 0.5);
+        (0..self.order.len()).map(of).collect()
+    }
+
     /// `None` if Σ has no inverse, or if D makes Σ⁻¹ + D indefinite: doubtful causes are added to Σ, which can then exceed the priors.
     fn mixture(&self, widths: &WidthUncertainty) -> Option<Vec<PosteriorComponent>> {
         let n = self.order.len();

@@ -15,6 +15,7 @@ use super::held_out::neither;
 use super::newton;
 use crate::identification::fit::{Observations, errors_on};
 use crate::measurement::split::{self, Split};
+use crate::measurement::stations;
 use truegrind_estimation::least_squares::lm;
 use truegrind_estimation::problem::{NormalEquations, Problem};
 use truegrind_math::statistics::ErrorSummary;
@@ -123,6 +124,12 @@ impl Validation {
         Steps::of(self, fit)?.held_out(&split::regions(&self.rows.dataset, REGIONS))
     }
 
+    /// Errors of the test rows without what the frames of small stations make of them; those that it makes alone are left out.
+    fn without_frames(&self, split: &Split, errors: Vec<f64>) -> Vec<f64> {
+        let [train, test] = [&split.train, &split.test].map(|rows| self.rows.dataset.subset(rows));
+        stations::without_frames(&train, &test, errors).into_iter().flatten().collect()
+    }
+
     fn held_out(&self, fit: &Extended, splits: &[Split]) -> ErrorSummary {
         let added = added_squares(&self.rows, &fit.model, &fit.frames);
         let errors: Vec<Vec<f64>> = splits
@@ -143,7 +150,7 @@ impl Validation {
                 }
                 let (model, frames) = fit.problem.apply(&x);
                 let errors = errors_on(&self.rows.subset(&split.test), &model, &frames);
-                with_uncertain_sides(errors, &split.test, &added)
+                self.without_frames(split, with_uncertain_sides(errors, &split.test, &added))
             })
             .collect();
         ErrorSummary::of(errors.concat())
@@ -202,7 +209,7 @@ impl<'a> Steps<'a> {
         let x: Vec<f64> = self.fit.x.iter().zip(step.iter()).map(|(x, s)| x - s).collect();
         let (model, frames) = self.fit.problem.apply(&x);
         let errors = errors_on(&rows.subset(&split.test), &model, &frames);
-        Some(with_uncertain_sides(errors, &split.test, &self.added))
+        Some(self.validation.without_frames(split, with_uncertain_sides(errors, &split.test, &self.added)))
     }
 }
 

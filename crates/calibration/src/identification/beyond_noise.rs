@@ -3,7 +3,8 @@
 
 use serde::Serialize;
 
-use crate::identification::rounded_log::RoundedLog;
+use super::repeats::Repeats;
+use super::rounded_log::RoundedLog;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::noise_floor::NoiseFloor;
 use truegrind_arm::estimated::beyond_noise::ErringArm;
@@ -47,6 +48,11 @@ fn mean_square(errors: &StageErrors, parameters: f64) -> f64 {
     (of_fitted + of_held_out) / (fitted - parameters.min(0.5 * fitted) + held_out)
 }
 
+/// The same of a fit with so many parameters.
+pub(super) fn mean_square_of(errors: &StageErrors, parameters: usize, sensor: Sensor) -> f64 {
+    mean_square(errors, parameters as f64 / sensor.axes() as f64)
+}
+
 impl BeyondNoise {
     /// From the errors of a model with so many parameters and the scatter of repeated poses.
     ///
@@ -59,8 +65,20 @@ impl BeyondNoise {
         let Some(floor) = repeats else {
             return Self::AtMost(of_position * errors.held_out.rmse.min(errors.fitted.rmse));
         };
-        let square = mean_square(errors, parameters as f64 / sensor.axes() as f64);
+        let square = mean_square_of(errors, parameters, sensor);
         Self::Known(of_position * (square - floor.sigma_mm.powi(2)).max(0.0).sqrt())
+    }
+
+    /// From the errors of a model with so many parameters and what the scatter of repeated poses is made of, where that is known.
+    pub(super) fn beside(
+        errors: &StageErrors,
+        parameters: usize,
+        sensor: Sensor,
+        repeats: Option<&Repeats>,
+    ) -> Self {
+        let Some(repeats) = repeats else { return Self::of(errors, parameters, sensor, None) };
+        let square = mean_square_of(errors, parameters, sensor);
+        Self::Known(of_position(sensor) * repeats.beyond(square).sqrt())
     }
 
     /// Beside rounding of the log, which is no error of the arm: its RMS in the readings (mm).

@@ -5,7 +5,7 @@ use thiserror::Error;
 use rayon::prelude::*;
 
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
-use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad, longer_tool};
+use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad, longer_tool, mean_square_of};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
     Fitted, OUTLIER_CUT, Observations, Outliers, Start, WRONG_ORIENTATION_RAD, errors_on, fit,
@@ -17,6 +17,7 @@ use crate::identification::linearised_readings::widen_by_scale;
 use crate::identification::misreading;
 use crate::identification::parameter_table::parameter_table;
 use crate::identification::prior_width::width_uncertainty;
+use crate::identification::repeats::Repeats;
 use crate::identification::rounded_log::{Asked, Rounding, spent};
 use crate::identification::rounding::{
     AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance, rounding_floor_mm,
@@ -26,10 +27,11 @@ use crate::identification::solver::{Family, SOLVERS, Solver};
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::identification::unseen_target::unseen_target;
-use crate::identification::verdict::{CONVERGED, Limits, VerdictBuilder};
+use crate::identification::verdict::{CONVERGED, Limits, NOT_NOISE, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::{self, NoiseFloor};
 use crate::measurement::split::Split;
+use crate::measurement::stations::without_frames;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{
     Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict, WidthUncertainty,
@@ -186,7 +188,7 @@ pub fn identify(
     let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
     // Before the fits, to limit peak memory.
-    let repeats = noise_floor::noise_floor_beside_shift(&observed.dataset).filter(NoiseFloor::is_known);
+    let scatter = noise_floor::noise_floor_beside_shift(&observed.dataset).filter(NoiseFloor::is_known);
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let (fitted_rows, held_rows) = {
         let Split { train, test } = split(&observed.dataset);
@@ -220,6 +222,8 @@ pub fn identify(
         widen_by_scale(&mut geometry, &observed.dataset, sigma);
     }
     let raw = options.stated_frames.as_ref().map(|f| summary_on(&observed, nominal, f));
+    let square_mm2 = mean_square_of(&trained.geometry, geometry.parameters.len(), observed.dataset.sensor);
+    let repeats = scatter.map(|floor| Repeats::of(floor, &observed.dataset, &geometry, square_mm2));
     let identifiability = geometry.identifiability();
     let parameters = parameter_table(&geometry, nominal);
     let sharpened = readout_fusion.is_ok();
@@ -245,19 +249,22 @@ pub fn identify(
     let mut estimated = with_sigma_in_region(estimated, &geometry);
     let sensor = observed.dataset.sensor;
     let mut beyond_noise =
-        BeyondNoise::of(&trained.geometry, geometry.parameters.len(), sensor, repeats.as_ref())
+        BeyondNoise::beside(&trained.geometry, geometry.parameters.len(), sensor, repeats.as_ref())
             .less_rounding(estimated.noise_floor_mm, sensor);
+    // Where repeated poses show more than white noise, they say nothing of what else there is beside the rounding.
+    let white = scatter.zip(repeats.as_ref().and_then(Repeats::white_mm));
+    let white = white.map(|(floor, sigma_mm)| NoiseFloor { sigma_mm, ..floor });
     let asked = Asked {
         observed: &observed,
         model: &geometry.model,
         frames: &geometry.frames,
         spent: spent(geometry.estimate.covariance.as_ref(), &geometry.priors),
         set_aside: &[],
-        repeats: repeats.as_ref(),
+        repeats: white.as_ref(),
     };
     let rounding = asked.rounding();
     if let Rounding::Rounded(rounded) = &rounding {
-        beyond_noise = beyond_noise.beside_rounded_log(rounded, repeats.as_ref(), sensor);
+        beyond_noise = beyond_noise.beside_rounded_log(rounded, white.as_ref(), sensor);
     }
     estimated.beyond_noise_mm = beyond_noise.known_mm();
     estimated.beyond_noise_rad = estimated
@@ -277,6 +284,7 @@ pub fn identify(
         still: still_joints(&estimated.region),
         set_up_anew: set_up_anew(&observed.dataset, &geometry),
         unseen_target: unseen_target(&geometry, &observed.dataset, &estimated),
+        repeats: repeats.as_ref().and_then(Repeats::pattern),
         longer_tool: longer_tool_of(&estimated, benefit.as_ref()),
         rounded_log: rounding.note(dataset.angle_step_rad, trained.geometry.held_out.rmse),
     };
@@ -360,12 +368,16 @@ fn fit_training_rows(
         return Err(WrongArm::Orientation { rad });
     }
     let on = |fitted: &Fitted| {
-        let held = errors_on(held, &fitted.model, &fitted.frames);
-        let errors = StageErrors {
-            fitted: summary_on(rows, &fitted.model, &fitted.frames),
-            held_out: ErrorSummary::of(held.iter().copied()),
+        let errors = errors_on(held, &fitted.model, &fitted.frames);
+        let counted = without_frames(&rows.dataset, &held.dataset, errors.clone());
+        // Where no station is placed well enough, large errors are better than none.
+        let is_counted = counted.iter().any(Option::is_some);
+        let held_out = if is_counted {
+            ErrorSummary::of(counted.into_iter().flatten())
+        } else {
+            ErrorSummary::of(errors.iter().copied())
         };
-        (errors, held)
+        (StageErrors { fitted: summary_on(rows, &fitted.model, &fitted.frames), held_out }, errors)
     };
     let mut training = stages.geometry(rows, &registered);
     training.problem.drop_rows();
@@ -547,10 +559,12 @@ pub(crate) fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
     }
 }
 
-/// Scatter of repeated poses (mm), otherwise the RMS effect of rounded angles; `None` if neither is known.
-fn noise_floor(repeats: Option<&NoiseFloor>, observed: &Observations, fitted: &Fitted) -> Option<f64> {
-    let scatter = repeats.map(|floor| floor.sigma_mm);
-    scatter.or_else(|| rounding_floor_mm(&observed.dataset, &fitted.model, &fitted.frames, &observed.angles))
+/// Scatter of repeated poses (mm), as far as it is white noise, otherwise the RMS effect of rounded angles; `None` if neither is known.
+fn noise_floor(repeats: Option<&Repeats>, observed: &Observations, fitted: &Fitted) -> Option<f64> {
+    if let Some(repeats) = repeats {
+        return repeats.white_mm();
+    }
+    rounding_floor_mm(&observed.dataset, &fitted.model, &fitted.frames, &observed.angles)
 }
 
 pub(crate) fn mean_condition(dataset: &Dataset) -> Condition {
@@ -600,6 +614,8 @@ struct VerdictInputs<'a> {
     set_up_anew: Option<String>,
     /// That the poses do not show the target's place on the flange.
     unseen_target: Option<String>,
+    /// What repeated poses show beside the noise of a reading.
+    repeats: Option<&'a str>,
     /// What errors beyond the noise make of a tool that is longer than the target is far from the flange.
     longer_tool: Option<String>,
     /// That the log rounds the angles.
@@ -660,6 +676,12 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     }
     if let Some(unseen_target) = &case.unseen_target {
         verdict.note(unseen_target.as_str());
+    }
+    if let Some(pattern) = case.repeats {
+        verdict.note(format!(
+            "{NOT_NOISE}: {pattern}. That was not taken for noise of the sensor where the expected error is stated; `diagnose` finds what it is \
+             and a model without it"
+        ));
     }
     if let Some(longer_tool) = &case.longer_tool {
         verdict.note(longer_tool.as_str());

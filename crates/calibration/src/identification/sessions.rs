@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::fit::Fitted;
+use super::repeats::residuals_mm;
 use crate::measurement::dataset::Dataset;
-use truegrind_estimation::problem::Problem;
 
 /// Fewest rows of a session that is judged.
 const FEWEST: usize = 8;
@@ -41,12 +41,7 @@ pub(super) fn set_up_anew(dataset: &Dataset, fitted: &Fitted) -> Option<String> 
     if dataset.rows.iter().all(|row| row.session().is_none()) {
         return None;
     }
-    let per = fitted.problem.rows_per_observation();
-    let mut residual = vec![0.0; fitted.problem.rows()];
-    fitted.problem.residuals(&fitted.estimate.x, 0..residual.len(), &mut residual);
-    for (i, (row, residual)) in dataset.rows.iter().zip(residual.chunks(per)).enumerate() {
-        let mut mm = Vector3::zeros();
-        residual.iter().take(3).enumerate().for_each(|(k, r)| mm[k] = r / fitted.problem.per_mm(i));
+    for (row, mm) in dataset.rows.iter().zip(residuals_mm(dataset, fitted)) {
         let session = sessions.entry((row.session().unwrap_or_default(), row.anchor)).or_default();
         session.count += 1.0;
         session.sum += mm;

@@ -29,6 +29,9 @@ const NAMED: usize = 4;
 /// Note of a verdict without stated limits.
 pub const NO_LIMITS: &str = "held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)";
 
+/// Begin of the note that repeated poses show more than noise: what was measured moved, so that the model is used with care.
+pub const NOT_NOISE: &str = "repeated poses differ by more than the noise of a reading";
+
 /// End of the note on a fit that converged.
 pub const CONVERGED: &str = "the fit converged";
 

@@ -24,6 +24,8 @@ pub struct Dataset {
     pub other_columns: Vec<String>,
     /// Notes for the user: columns skipped, blank rows dropped.
     pub notes: Vec<String>,
+    /// Names of the stations as the file has them, in the order of [`Row::anchor`]; none without a column of stations.
+    pub station_names: Vec<String>,
     /// Step to which the angles are rounded (rad); absent where no common step divides all of them.
     pub angle_step_rad: Option<f64>,
     /// Step to which the controller's read-out is rounded (mm); absent as above.
@@ -43,6 +45,7 @@ impl Dataset {
             rows: rows.into(),
             other_columns: Vec::new(),
             notes: Vec::new(),
+            station_names: Vec::new(),
             angle_step_rad: None,
             readout_step_mm: None,
             reading_step_mm: None,
@@ -67,6 +70,11 @@ impl Dataset {
     /// The station of a row, by index; the first for cables.
     pub fn station_of(&self, row: usize) -> usize {
         if self.sensor == Sensor::Cable { 0 } else { self.rows[row].anchor }
+    }
+
+    /// The name of a station as the file has it, else its number from 1.
+    pub fn station_name(&self, anchor: usize) -> String {
+        self.station_names.get(anchor).cloned().unwrap_or_else(|| (anchor + 1).to_string())
     }
 
     fn places(&self) -> usize {

@@ -17,7 +17,7 @@ mod clock;
 mod column_names;
 mod columns;
 mod error;
-mod join_by_time;
+pub(crate) mod join_by_time;
 mod options;
 mod tracker_export;
 mod foreign;

@@ -77,7 +77,25 @@ const FEWEST_ACROSS: usize = 4;
 const IN_COMMON: f64 = 0.7;
 
 /// The rows of a pose, outlet and approach, with their readings.
-type Readings = Vec<(usize, Vector3<f64>)>;
+pub(crate) type Readings = Vec<(usize, Vector3<f64>)>;
+
+/// Those that were repeated, without copies.
+pub(crate) fn repeated_readings(data: &Dataset) -> Vec<Readings> {
+    let mut out = readings_of_poses(data);
+    if repeats_of_readings(data).are_copied() {
+        for group in &mut out {
+            let mut own: Readings = Vec::with_capacity(group.len());
+            for (row, at) in group.iter() {
+                if own.iter().all(|(_, known)| known != at) {
+                    own.push((*row, *at));
+                }
+            }
+            *group = own;
+        }
+        out.retain(|group| group.len() > 1);
+    }
+    out
+}
 
 /// Those that were repeated.
 fn readings_of_poses(data: &Dataset) -> Vec<Readings> {

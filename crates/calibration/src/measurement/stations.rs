@@ -4,11 +4,12 @@
 //! [`disturbances`] of the measurement, a shift and a turn that every fit estimates along with the arm. Range and bearing of a station beyond
 //! the first are no longer told apart, so that errors that depend on the distance are the first one's.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use thiserror::Error;
 
 use super::dataset::{Dataset, Reading, Row, Sensor};
 use super::registration::{self, known_target};
+use super::row_list::row_list;
 use super::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
@@ -20,16 +21,19 @@ const FEWEST: usize = 4;
 /// The rows of a station do not say where it stood.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "{file}: the {rows} rows of station {station} (column station) do not show where it stood: measure at least {FEWEST} poses from each station, \
-     not on a line"
+    "{file}: the {rows} rows of station {station} (column station: {}) do not show where it stood: measure at least {FEWEST} poses from each \
+     station, not on a line, and write its name alike in all of its rows",
+    row_list(.numbers)
 )]
 pub struct StationError {
     /// File.
     pub file: String,
-    /// Station, from 1.
-    pub station: usize,
+    /// Station, as the file names it.
+    pub station: String,
     /// Its rows.
     pub rows: usize,
+    /// Their numbers in the file.
+    pub numbers: Vec<usize>,
 }
 
 /// How each station but the first stands to where the data sheet's arm puts it: nothing yet, to be fitted.
@@ -91,8 +95,9 @@ fn placed_by_arm(
     };
     let unplaced = |station: usize| StationError {
         file: dataset.file.clone(),
-        station: station + 1,
+        station: dataset.station_name(station),
         rows: stations[station].len(),
+        numbers: stations[station].iter().map(|&row| dataset.rows[row].number).collect(),
     };
     let largest = (0..stations.len()).max_by_key(|&station| stations[station].len()).unwrap_or_default();
     let target_mm = target_mm(&flanges(&stations[largest]), &stations[largest], dataset)
@@ -102,6 +107,67 @@ fn placed_by_arm(
         fit.filter(|_| rows.len() >= FEWEST).map(|fit| fit.base_from_sensor).ok_or_else(|| unplaced(station))
     };
     stations.iter().enumerate().map(place).collect()
+}
+
+/// Held-out errors (mm) of the rows `test` without what the frame of a station makes of them, which the rows `train` place.
+///
+/// A station of four or five poses is placed so badly by those that are left of it that its held-out errors are several times those of the
+/// arm. With V what n readings of unit variance leave uncertain of a frame at the place of a row, errors are divided by √(1 + tr V/3); where
+/// the frame makes more of an error than three readings would, it shows nothing, and there is none. Rows of one station stay as they are.
+///
+/// V = I/n + [e]ₓ M⁻¹ [e]ₓᵀ, e the place relative to the mean of the n readings, M their second moments Σ (|d|² I − d dᵀ); measured orientations
+/// leave the first part alone.
+pub(crate) fn without_frames(train: &Dataset, test: &Dataset, errors: Vec<f64>) -> Vec<Option<f64>> {
+    let stations = train.stations().max(test.stations());
+    if stations < 2 {
+        return errors.into_iter().map(Some).collect();
+    }
+    let frames: Vec<Option<FrameVariance>> =
+        (0..stations).map(|station| FrameVariance::of(train, station)).collect();
+    let own = |(row, error): (&Row, f64)| {
+        let variance = frames[row.anchor].as_ref()?.at(&row.reading.place_mm());
+        (variance < MOST_OF_FRAME).then(|| error / (1.0 + variance).sqrt())
+    };
+    test.rows.iter().zip(errors).map(own).collect()
+}
+
+/// Variance of a frame, in that of a reading, beyond which a held-out row shows nothing of the arm.
+const MOST_OF_FRAME: f64 = 3.0;
+
+/// Where the readings of a station leave its frame uncertain.
+struct FrameVariance {
+    count: f64,
+    mean: Vector3<f64>,
+    /// Inverse second moments; absent where orientations were measured.
+    inverse: Option<Matrix3<f64>>,
+}
+
+impl FrameVariance {
+    /// `None` where the rows do not determine it.
+    fn of(dataset: &Dataset, station: usize) -> Option<Self> {
+        let rows = || dataset.rows.iter().filter(|row| row.anchor == station);
+        let count = rows().count() as f64;
+        if count == 0.0 {
+            return None;
+        }
+        let mean = rows().map(|row| row.reading.place_mm()).sum::<Vector3<f64>>() / count;
+        if dataset.sensor == Sensor::Pose {
+            return Some(Self { count, mean, inverse: None });
+        }
+        let moment = |row: &Row| {
+            let d = row.reading.place_mm() - mean;
+            Matrix3::identity() * d.norm_squared() - d * d.transpose()
+        };
+        let inverse = rows().map(moment).sum::<Matrix3<f64>>().cholesky()?.inverse();
+        Some(Self { count, mean, inverse: Some(inverse) })
+    }
+
+    /// tr V/3.
+    fn at(&self, place: &Vector3<f64>) -> f64 {
+        let lever = (place - self.mean).cross_matrix();
+        let turned = self.inverse.map_or(0.0, |inverse| (lever * inverse * lever.transpose()).trace());
+        1.0 / self.count + turned / 3.0
+    }
 }
 
 /// The target on the flange as rows of one station show it.

@@ -29,6 +29,8 @@ pub struct Departure {
     pub rms_mm: f64,
     /// What the uncertainties of the first model and of the track make of it (mm, 1σ).
     pub expected_mm: f64,
+    /// What the uncertainty of the track alone makes of it: the error that its model is expected to have (mm).
+    pub tracked_mm: f64,
     /// Displacement since the first poses of the track, and what the uncertainties make of it (mm).
     pub since_first_poses_mm: Option<[f64; 2]>,
     /// Parameters that moved by more than four of the standard deviations that they began with, those that moved most first.
@@ -114,6 +116,8 @@ impl Tracker {
             Distance::of(&columns, poses.len())
         };
         let whole = distance(&first, &self.initial.covariance);
+        let certain = DMatrix::zeros(arm, arm);
+        let tracked_mm = distance(&first, &certain).expected_mm;
         let since = self.state.start.as_ref().and_then(|start| {
             let covariance = start.covariance()?.view((0, 0), (arm, arm)).into_owned();
             Some(distance(&placed(&self.without_rows().apply(&start.x).0), &covariance))
@@ -132,6 +136,7 @@ impl Tracker {
         Some(Departure {
             rms_mm: whole.rms_mm,
             expected_mm: whole.expected_mm,
+            tracked_mm,
             since_first_poses_mm: since.as_ref().map(|since| [since.rms_mm, since.expected_mm]),
             parameters: self.moved_parameters(),
             is_of_shape,

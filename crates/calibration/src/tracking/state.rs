@@ -39,6 +39,9 @@ pub struct PoseRecord {
     pub nis: f64,
     /// Residual at the updated state (mm): signed for a cable, the norm otherwise.
     pub error_mm: f64,
+    /// The same before the update, when the pose was not yet known; absent in states of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted_mm: Option<f64>,
 }
 
 impl PoseRecord {

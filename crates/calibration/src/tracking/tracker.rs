@@ -256,6 +256,8 @@ impl Tracker {
         at: usize,
         mut record: PoseRecord,
     ) -> Option<Alarm> {
+        record.predicted_mm =
+            Some(self.error_mm(problem, at, record.per_mm).abs()).filter(|mm| mm.is_finite());
         let taken = self.update(problem, at);
         record.nis = taken.nis;
         self.state.poses += 1;
@@ -354,6 +356,7 @@ impl Tracker {
             per_rad: weight.per_rad,
             nis: 0.0,
             error_mm: 0.0,
+            predicted_mm: None,
         };
         observed.dataset.rows.iter().zip(&weights).map(one).collect()
     }

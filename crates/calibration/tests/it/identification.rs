@@ -4,6 +4,7 @@ mod beyond_noise;
 mod calibration;
 mod prior_width;
 mod promise;
+mod repeats;
 mod rounded_log;
 mod sensor_laws;
 mod stated_frame;

@@ -319,6 +319,24 @@ impl CellAxis {
     }
 }
 
+/// Keys that hold for all of a cell file.
+const OF_THE_FILE: [&str; 4] = ["robot", "angles", "control", "start_deg"];
+
+/// The message of the parser, and what TOML makes of a key of the file that stands below the head of a section.
+fn with_order(message: String) -> String {
+    let key = message.split("unknown field `").nth(1).and_then(|rest| rest.split('`').next());
+    match key.filter(|key| OF_THE_FILE.contains(key)) {
+        None => message,
+        Some(key) => {
+            let message = message.trim_end();
+            format!(
+                "{message}; `{key}` is there, but below the head of a section, to which TOML then counts it: put it above the first [[tool]], \
+                 [[wobj]] or [[external]]"
+            )
+        }
+    }
+}
+
 /// The cell file: origins of tools and work objects, and external axes.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -363,14 +381,17 @@ impl Cell {
     /// // One tool under two names.
     /// let twice = "[[tool]]\nname = \"T8\"\norigin = \"metrology\"\n[[tool]]\nname = \"T08\"\norigin = \"taught\"\n";
     /// assert!(matches!(Cell::from_toml(twice), Err(CellError::Twice { kind: FrameKind::Tool, .. })));
+    /// // A key of the file below a section.
+    /// let late = "[[tool]]\nname = \"T8\"\norigin = \"metrology\"\nstart_deg = [0, 0, 0, 0, 90, 0]\n";
+    /// assert!(Cell::from_toml(late).is_err_and(|error| error.to_string().contains("put it above the first [[tool]]")));
     /// # Ok::<(), CellError>(())
     /// ```
     ///
     /// # Errors
     /// [`CellError`], with key and reason.
     pub fn from_toml(text: &str) -> Result<Self, CellError> {
-        let (cell, open) =
-            super::placeholders::read::<Cell>(text).map_err(|e| CellError::Syntax(e.to_string()))?;
+        let (cell, open) = super::placeholders::read::<Cell>(text)
+            .map_err(|e| CellError::Syntax(with_order(e.to_string())))?;
         let cell = Cell { open, ..cell };
         if let Some(found) = cell.angles.as_ref().filter(|word| Angles::of(word).is_none()) {
             return Err(CellError::Angles { found: found.clone() });

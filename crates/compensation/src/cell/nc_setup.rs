@@ -1,5 +1,7 @@
 //! What cell file and robot file state that NC programs do not: control, angle convention, tools and work offsets.
 
+use std::collections::BTreeSet;
+
 use super::file::{Cell, CellFrame};
 use truegrind_arm::robots::sheet::Orientation;
 use truegrind_programs::motion::Frame;
@@ -16,6 +18,7 @@ pub fn cell_setup(cell: &Cell, orientation: Option<Orientation>) -> Setup {
         angles: cell.angles().or_else(|| orientation.and_then(angle_convention)),
         tools: frames(&cell.tool),
         frames: frames(&cell.wobj),
+        called: BTreeSet::new(),
     }
 }
 

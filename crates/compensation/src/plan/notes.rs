@@ -8,7 +8,9 @@ use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
 use crate::plan::MotionOutcome;
 use crate::risk::beyond_noise::ALIKE_RAD;
+use crate::risk::cut_risk::UnseenShare;
 use crate::target::solved_target::SolvedTargets;
+use truegrind_arm::estimated::Estimated;
 use truegrind_programs::motion::load::Grip;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Origin, Place, Switch};
 
@@ -54,6 +56,29 @@ const BEYOND_SIGMA: f64 = 2.0;
 /// Share of the largest σ from which an error that it counts is stated.
 const COUNTED_SHARE: f64 = 0.5;
 
+/// Sets of missing words that are told.
+const TOLD_SETS: usize = 4;
+
+/// The words that motions lack behind labels, jumps, calls and loops, each set with its lines.
+fn unstated_notes(listing: &Listing) -> Vec<String> {
+    let mut sets: Vec<(&str, Vec<u32>)> = Vec::new();
+    for (motion, words) in &listing.nc.unstated {
+        match sets.iter_mut().find(|(known, _)| known == words) {
+            Some((_, motions)) => motions.push(*motion),
+            None => sets.push((words, vec![*motion])),
+        }
+    }
+    let note = |(words, motions): &(&str, Vec<u32>)| {
+        let lines = lines_of(listing, motions)?;
+        Some(format!(
+            "behind a label, jump, call, loop or branch the text does not tell these, and {} without them: {words}. State them in the first \
+             of these blocks or between the label and it ({lines})",
+            counted(motions.len(), "motion is left", "motions are left")
+        ))
+    };
+    sets.iter().take(TOLD_SETS).filter_map(note).collect()
+}
+
 /// What the measurement of the arm deviates from its model beyond the noise: where a σ is mostly that, how it is counted; in a model of an
 /// earlier version, where it is more than every σ of the program.
 pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item = f64>) -> Option<String> {
@@ -77,6 +102,22 @@ pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item =
         format!(
             "the measurement deviates from this model by {beyond:.3} mm RMS more than noise explains: programs may be off by as much beyond every σ \
              stated here; `truegrind diagnose` looks for the causes"
+        )
+    })
+}
+
+/// A smaller σ is small enough whatever it comes from (mm).
+const WORTH_TELLING_MM: f64 = 0.05;
+
+/// What of the stated σ comes from parameters that the measurement did not show, where that is most of it.
+pub(crate) fn unseen_note(knowledge: &Estimated, unseen: &UnseenShare) -> Option<String> {
+    let name = &knowledge.parameters.get(unseen.parameter?)?.name;
+    (unseen.unseen_mm > WORTH_TELLING_MM).then(|| {
+        format!(
+            "of the {:.3} mm (1σ) stated for a cut, {:.3} mm are not what the measurement found uncertain but what it could not show: {name} above all \
+             keeps the tolerance of this arm's links, since the place of the target on the flange is not known independently. Where tool and work \
+             object are taught with this arm (cell file, origin = \"taught\"), such errors cancel",
+            unseen.sigma_mm, unseen.unseen_mm
         )
     })
 }
@@ -127,14 +168,17 @@ pub(crate) fn unchecked_notes(
             counted(to_persistent.len(), "motion goes", "motions go")
         ));
     }
+    out.extend(unstated_notes(listing));
     if let Some(lines) = lines_of(listing, &listing.nc.external_calls) {
         out.push(format!(
-            "{} not in the same file: it is assumed to leave work offset, shifts, tool, units and tool centre point control \
-             unchanged ({lines})",
-            counted(listing.nc.external_calls.len(), "block calls a program that is", "blocks call a program that is")
+            "{} that is not followed: NC programs are read each by itself, whether or not the other one is given too, lies in the same folder or \
+             stands in the same archive file (--together is for modules of RAPID). It is assumed to leave work offset, shifts, tool, units and tool \
+             centre point control unchanged; state behind the call again what it changes ({lines})",
+            counted(listing.nc.external_calls.len(), "block calls another program", "blocks call another program")
         ));
     }
     out.extend(outside_calls_note(listing));
+    out.extend(position_decisions_note(listing));
     out.extend(open_control_note(listing));
     out.extend(unstated_length_note(listing));
     let curve = |m: &u32| {
@@ -186,6 +230,15 @@ fn unstated_length_note(listing: &Listing) -> Option<String> {
     Some(format!(
         "no G43: LinuxCNC does not take over the length of a tool by T and M6, so the tool tip is where the tool is said to have it only if G43 \
          is still active from before. State G43 behind M6, or G49 where X Y Z are not those of the tip (before {lines})"
+    ))
+}
+
+/// Decisions by the position that the robot reads, at the end of motions that are corrected.
+fn position_decisions_note(listing: &Listing) -> Option<String> {
+    let lines = numbered(&listing.files, listing.position_decisions.iter().copied())?;
+    Some(format!(
+        "the program decides by the position that the robot reads (CRobT, CPos, CJointT). Behind a corrected motion that is the corrected position: \
+         see that each tolerance there is wider than the largest correction ({lines})"
     ))
 }
 

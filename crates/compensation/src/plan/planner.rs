@@ -26,7 +26,7 @@ use crate::options::{Options, is_rewritable};
 use crate::plan::measured_sigma;
 use crate::plan::notes::{
     backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, several_starts_note,
-    unchecked_notes, unknown_loads,
+    unchecked_notes, unknown_loads, unseen_note,
 };
 use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
@@ -145,8 +145,10 @@ impl<'a> SolvedProgram<'a> {
         for cut in &mut plan.cuts {
             cut.corrected = cut.motions.iter().any(rewritten);
         }
-        let corrected = plan.cuts.iter().filter(|cut| cut.corrected);
-        plan.probability_of_harm = assessment.probability_of_harm_of(corrected);
+        let corrected = || plan.cuts.iter().filter(|cut| cut.corrected);
+        plan.probability_of_harm = assessment.probability_of_harm_of(corrected());
+        let unseen = arms.knowledge.zip(assessment.unseen.as_ref()).filter(|_| corrected().next().is_some());
+        plan.notes.extend(unseen.and_then(|(knowledge, unseen)| unseen_note(knowledge, unseen)));
         plan
     }
 

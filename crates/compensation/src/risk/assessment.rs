@@ -13,7 +13,7 @@ use crate::cut::{CutsOf, is_one_part};
 use crate::frames::frame_pair::ResolvedFrames;
 use crate::plan::reason::OutcomeReason;
 use crate::risk::beyond_noise::RegisteredErrors;
-use crate::risk::cut_risk::{self, CutRisk, Judgement, PartRegistration};
+use crate::risk::cut_risk::{self, CutRisk, Judgement, PartRegistration, UnseenShare};
 use crate::risk::fixtures;
 use crate::risk::placement::{
     self, AssessedObject, AssessedTarget, ObjectPlacement, PathDeviation, Placement, PlacementChoice,
@@ -34,6 +34,8 @@ pub(crate) struct Assessment {
     pub(crate) placements: Vec<ObjectPlacement>,
     /// One entry per cut.
     pub(crate) cuts: Vec<CutRisk>,
+    /// Of the cuts whose σ comes for the most part from what the measurement did not show, the largest σ.
+    pub(crate) unseen: Option<UnseenShare>,
     /// Contribution of each cut to the program's probability of harm.
     shares: Vec<CutContribution>,
     /// Posterior of the arm's parameters.
@@ -267,6 +269,7 @@ impl Assessment {
         max_risk: f64,
     ) {
         let EstimateContext { conditions, knowledge, posterior } = *with;
+        let unseen = knowledge.unseen();
         let judge = |(motions, commanded): &(Vec<u32>, Vec<u32>)| {
             let targets: Vec<AssessedTarget> = commanded.iter().filter_map(|m| at(*m)).collect();
             let object = listing.motions[motions[0] as usize].work_object?;
@@ -274,7 +277,7 @@ impl Assessment {
                 parts.get(&chosen.part_of[object as usize]).filter(|_| !targets.is_empty())?;
             let off = PathDeviation::of_part(&targets, reference, list, conditions, knowledge);
             let part = PartRegistration { registration, twists, errors: errors.as_ref() };
-            let judgement = cut_risk::assess_cut(&off, &part, knowledge, *applied);
+            let judgement = cut_risk::assess_cut(&off, &part, knowledge, &unseen, *applied);
             let weight = motions.len() as f64 / targets.len() as f64;
             let points = targets.len();
             let harm =
@@ -300,6 +303,13 @@ impl Assessment {
         let left_for_risk = !(probability_of_harm <= max_risk);
         let cut_index = self.cuts.len() as u32;
         motions.iter().for_each(|m| self.cut_of[*m as usize] = Some(cut_index));
+        let unseen = judgement.unseen;
+        if !left_for_risk
+            && unseen.prevails()
+            && self.unseen.is_none_or(|worst| unseen.unseen_mm > worst.unseen_mm)
+        {
+            self.unseen = Some(unseen);
+        }
         self.cuts.push(CutRisk {
             motions,
             assessed: judged.placement,

@@ -45,6 +45,26 @@ pub(crate) struct Judgement {
     pub(crate) toward: DVector<f64>,
     /// Variance of d·e by the errors e beyond the noise (mm⁴).
     pub(crate) beyond: f64,
+    /// What of σ the measurement did not show.
+    pub(crate) unseen: UnseenShare,
+}
+
+/// What of a σ comes from parameters of which the measurement showed less than half.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct UnseenShare {
+    /// σ as a whole (RMS, mm).
+    pub(crate) sigma_mm: f64,
+    /// By those parameters (RMS, mm).
+    pub(crate) unseen_mm: f64,
+    /// The one of them that contributes most, as an index into the order of the parameters.
+    pub(crate) parameter: Option<usize>,
+}
+
+impl UnseenShare {
+    /// Whether more than half of the variance was not seen.
+    pub(crate) fn prevails(&self) -> bool {
+        2.0 * self.unseen_mm.powi(2) > self.sigma_mm.powi(2)
+    }
 }
 
 /// Most points by which a cut is assessed.
@@ -64,6 +84,7 @@ pub(crate) fn assess_cut(
     off: &PathDeviation,
     part: &PartRegistration<'_>,
     knowledge: &Estimated,
+    unseen: &[bool],
     placement: Placement,
 ) -> Judgement {
     let count = off.shifts.len();
@@ -76,12 +97,13 @@ pub(crate) fn assess_cut(
         }
     }
     let errors = CutErrors::of(&off.errors, &off.intended, &off.shifts, part.registration, part.errors);
-    let of_shape = total_variance(&shape_jacobian, &knowledge.covariance) + errors.shape_square_mm2;
-    let (jacobian, variance, beyond) = match placement {
-        Placement::Shape => (&shape_jacobian, of_shape, errors.shape_along_mm4),
+    let shape = total_variance(&shape_jacobian, &knowledge.covariance, unseen);
+    let of_shape = shape.total + errors.shape_square_mm2;
+    let (jacobian, assessed, variance, beyond) = match placement {
+        Placement::Shape => (&shape_jacobian, shape, of_shape, errors.shape_along_mm4),
         _ => {
-            let variance = total_variance(&off.jacobian, &knowledge.covariance) + errors.square_mm2;
-            (&off.jacobian, variance, errors.along_mm4)
+            let whole = total_variance(&off.jacobian, &knowledge.covariance, unseen);
+            (&off.jacobian, whole, whole.total + errors.square_mm2, errors.along_mm4)
         }
     };
     let square = off.shifts.iter().map(Vector3::norm_squared).sum();
@@ -99,15 +121,30 @@ pub(crate) fn assess_cut(
         square,
         toward,
         beyond,
+        unseen: UnseenShare {
+            sigma_mm: rms(variance),
+            unseen_mm: rms(assessed.unseen),
+            parameter: assessed.least_seen,
+        },
     }
 }
 
+/// Σ tr(J C Jᵀ) over points (mm²).
+#[derive(Debug, Clone, Copy, Default)]
+struct TotalVariance {
+    total: f64,
+    /// By the parameters that the measurement did not show.
+    unseen: f64,
+    /// The one of them that contributes most.
+    least_seen: Option<usize>,
+}
+
 /// Σ tr(J C Jᵀ) over the points, whose Jacobians J are stacked (3 n × p), C the covariance of the parameters (p × p):
-/// tr(C Σ JᵀJ), whose sum over rows is vectorised.
-fn total_variance(jacobian: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
+/// tr(C Σ JᵀJ), whose sum over rows is vectorised. `unseen`: by parameter.
+fn total_variance(jacobian: &DMatrix<f64>, covariance: &DMatrix<f64>, unseen: &[bool]) -> TotalVariance {
     let p = jacobian.ncols();
     if p == 0 {
-        return 0.0;
+        return TotalVariance::default();
     }
     // Padded by zeros to whole groups of rows.
     let rows = jacobian.nrows().next_multiple_of(WIDTH);
@@ -121,14 +158,25 @@ fn total_variance(jacobian: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
     let mut products = DMatrix::zeros(p, p);
     add_products(columns.as_slice(), rows, products.as_mut_slice());
     // The lower triangle is filled.
-    let mut sum = 0.0;
+    let (mut out, mut most) = (TotalVariance::default(), 0.0);
     for j in 0..p {
-        sum += covariance[(j, j)] * products[(j, j)];
+        let own = covariance[(j, j)] * products[(j, j)];
+        out.total += own;
+        if unseen[j] {
+            out.unseen += own;
+            if own > most {
+                (out.least_seen, most) = (Some(j), own);
+            }
+        }
         for i in j + 1..p {
-            sum += 2.0 * covariance[(i, j)] * products[(i, j)];
+            let mixed = 2.0 * covariance[(i, j)] * products[(i, j)];
+            out.total += mixed;
+            if unseen[i] && unseen[j] {
+                out.unseen += mixed;
+            }
         }
     }
-    sum
+    out
 }
 
 /// The registration of a part expressed in the base, for a stationary work object. Where that was taught, the registration is relative to

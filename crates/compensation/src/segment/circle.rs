@@ -22,7 +22,12 @@ use truegrind_programs::rewrite::Extra;
 pub(crate) struct Circle {
     pub(crate) intended: Curve,
     pub(crate) commanded: Curve,
+    /// The part of the intended curve that the commanded one stands for, by share.
+    pub(crate) shares: [f64; 2],
 }
+
+/// All of a curve.
+pub(crate) const WHOLE: [f64; 2] = [0.0, 1.0];
 
 impl Circle {
     /// From its three corrected points; `None` where they make no circle.
@@ -36,6 +41,7 @@ impl Circle {
         Some(Self {
             intended: Curve::round(from.intended, via_meant, to.intended, motion)?,
             commanded: Curve::round(from.commanded, via_told, to.commanded, motion)?,
+            shares: WHOLE,
         })
     }
 
@@ -49,11 +55,14 @@ impl Circle {
                 arms.nominal.solve_near(&to.frames.commanded.flange_for(&self.commanded.at(s)), &near);
             solution.ok().map(|solution| solution.joints)
         };
-        let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames.real.target_of(flange), s);
+        let [first, last] = self.shares;
+        let near = |s: f64| first + (last - first) * s;
+        let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames.real.target_of(flange), near(s));
         // At least one sample per eighth of a turn, of the tool too, and per piece of a long arc.
         let sweep = self.intended.arc().map_or(0.0, |arc| arc.sweep).max(self.intended.axes_turn_rad());
-        let pieces = ((sweep / std::f64::consts::FRAC_PI_4).ceil() as usize)
-            .max((self.intended.length_mm() / PIECE_MM).ceil() as usize)
+        let part = last - first;
+        let pieces = ((part * sweep / std::f64::consts::FRAC_PI_4).ceil() as usize)
+            .max((part * self.intended.length_mm() / PIECE_MM).ceil() as usize)
             .clamp(4, 64);
         match path.play_operator(arms) {
             Some(play_operator) => play_operator.largest_deviation(STEPS * pieces, &motor, &off),

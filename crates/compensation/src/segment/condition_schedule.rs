@@ -1,5 +1,7 @@
 //! Condition of the arm along a segment, and the sampling accuracy of segments.
 
+use crate::backlash::motion_end::{BacklashSides, JointSides};
+
 /// Accuracy to which sampled deviations are determined between samples (mm): the midpoint deviates from the chord of two
 /// samples by no more.
 pub(crate) const CHORD_MM: f64 = 0.002;
@@ -14,6 +16,14 @@ pub(crate) struct ConditionSchedule {
 }
 
 impl ConditionSchedule {
+    /// Along a segment with these backlash sides; `condition_index`: that of the sides with the payload there.
+    pub(crate) fn of(course: &BacklashSides, mut condition_index: impl FnMut(JointSides) -> usize) -> Self {
+        let mut turns = course.turns.iter();
+        let first = turns.next().map(|turn| turn.1);
+        let later = turns.map(|(share, sides)| (*share, condition_index(*sides))).collect();
+        Self { first: condition_index(first.unwrap_or(course.end)), later }
+    }
+
     pub(crate) fn at(&self, s: f64) -> usize {
         self.later.iter().rev().find(|(from, _)| *from <= s).map_or(self.first, |later| later.1)
     }

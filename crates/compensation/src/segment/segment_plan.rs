@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::arms::Arms;
 use crate::options::{Circles, Emit, Options};
 use crate::plan::reason::OutcomeReason;
-use crate::segment::circle::Circle;
+use crate::segment::circle::{Circle, WHOLE};
 use crate::segment::corner::{CornerSegments, corner_deviation};
 use crate::segment::curve::{CLOSED_MM, Curve};
 use crate::segment::line::{
@@ -112,14 +112,15 @@ fn line(
 
 /// Deviation on the way that the control may take instead, where A, B and C run linearly (mm); 0 where that is the same way. Which of the
 /// two it takes is not known: the worse counts.
-fn by_axes_mm(
+pub(crate) fn by_axes_mm(
     motion: &Motion,
     path: &Segment<'_>,
     [intended, commanded]: &[Curve; 2],
     arms: &Arms<'_>,
 ) -> f64 {
     motion.axis_turn.as_deref().map_or(0.0, |turn| {
-        Circle { intended: intended.by_axes(turn), commanded: commanded.by_axes(turn) }.deviation(path, arms)
+        let [intended, commanded] = [intended, commanded].map(|curve| curve.by_axes(turn));
+        Circle { intended, commanded, shares: WHOLE }.deviation(path, arms)
     })
 }
 

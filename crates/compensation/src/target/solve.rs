@@ -128,16 +128,7 @@ impl<'t> TargetSolver<'_, 't> {
             self.fill(&mut targets, arms, &before, &condition_indices, Some(&stale));
         }
         let schedules = sides.iter().enumerate().map(|(m, course)| {
-            let mut later = course
-                .turns
-                .iter()
-                .map(|(share, sides)| (*share, arms.conditions.condition_index(*sides, load(m))));
-            let first = later.next().map(|turn| turn.1);
-            let later: Vec<(f64, usize)> = later.collect();
-            ConditionSchedule {
-                first: first.unwrap_or_else(|| arms.conditions.condition_index(course.end, load(m))),
-                later,
-            }
+            ConditionSchedule::of(course, |sides| arms.conditions.condition_index(sides, load(m)))
         });
         let schedules = schedules.collect();
         self.solved(targets, schedules)

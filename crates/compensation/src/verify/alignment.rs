@@ -16,8 +16,14 @@ pub(crate) fn align(before: &[Option<&ExecutedEnd>], after: &[Option<&ExecutedEn
         return vec![None; n];
     }
     let extra = m - n;
+    // A corrected target reaches the intended place, or where only the shape is corrected lies near to it. An inserted one on an arc of short
+    // segments may be nearer to it than the correction is large.
     let distance = |i: usize, k: usize| match (before[i], after[k]) {
-        (Some(a), Some(b)) => (a.commanded.translation.vector - b.commanded.translation.vector).norm(),
+        (Some(a), Some(b)) => {
+            let from = a.commanded.translation.vector;
+            let [commanded, reached] = [b.commanded, b.reached].map(|pose| pose.translation.vector);
+            (from - commanded).norm().min((from - reached).norm())
+        }
         (None, None) => 0.0,
         _ => OTHER_KIND_MM,
     };

@@ -5,9 +5,10 @@
 
 use std::collections::HashMap;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
-use super::executed_end::ExecutedEnd;
+use super::executed_end::{ExecutedEnd, deviation};
+use super::kept_placement::KeptPlacement;
 use crate::line_list::lines_of;
 use crate::segment::curve::Curve;
 use truegrind_arm::model::Joints;
@@ -28,8 +29,12 @@ const CORRECTED_TURN_RAD: f64 = 0.5;
 
 /// How much the deviation may change from a cut to an air move beside it, per distance: a placement that is kept is turned by less (rad).
 const FREE_LEVER: f64 = 0.003;
-/// How far an air move may be turned off what the original intends, beyond the original itself (°).
+/// How far the tool may be turned off what the original intends, beyond the original itself (°): a program may be verified with another
+/// model than the one that corrected it, but no correction turns a tool by more.
 const FREE_DEG: f64 = 0.3;
+/// Steps in which the orientation along a way is searched (°), and most of them.
+const TURN_STEP_DEG: f64 = 0.05;
+const MOST_TURN_STEPS: f64 = 4000.0;
 /// Targets are the same within this (mm, rad): numbers are written with fewer decimals.
 const SAME_MM: f64 = 1e-3;
 const SAME_RAD: f64 = 1e-5;
@@ -44,6 +49,8 @@ pub(super) struct Compared<'a> {
     pub(super) partners: &'a [Option<usize>],
     pub(super) before: &'a [Option<&'a ExecutedEnd>],
     pub(super) after: &'a [Option<&'a ExecutedEnd>],
+    /// How the cuts lie off as a whole.
+    pub(super) placements: &'a [KeptPlacement],
     /// The quarters cf1, cf4 and cf6 of joints of the nominal arm.
     pub(super) configuration: &'a dyn Fn(&Joints) -> [i32; 3],
 }
@@ -129,7 +136,7 @@ impl Compared<'_> {
         if let Some(mm) = self.joint_way_off_mm(index, partner) {
             found.push(partner, format!("joint targets that leave the line of the original by {mm:.1} mm"));
         }
-        if let Some(what) = self.air_target_off(index, partner) {
+        if let Some(what) = self.air_target_off(index, partner).or_else(|| self.turned_off(index, partner)) {
             found.push(partner, what);
         }
         // The text of NC programs is compared word by word, and an inserted block near its neighbours may be taken for one of them here.
@@ -232,14 +239,49 @@ impl Compared<'_> {
         let (beside, apart_mm) =
             self.deviation_beside(index).unwrap_or_else(|| (deviation(before, before), 0.0));
         let bound_mm = FREE_MM + FREE_LEVER * apart_mm;
-        if off.norm() > FREE_MM && (off - beside).norm() > bound_mm {
+        let place = (before.base_from_object * before.commanded).translation.vector;
+        let is_carried = self.placements.iter().any(|kept| (off - kept.at(&place)).norm() <= bound_mm);
+        if off.norm() > FREE_MM && (off - beside).norm() > bound_mm && !is_carried {
             let mm = off.norm();
             return Some(format!("{} ends {mm:.1} mm from where the original intends", is.instruction));
         }
-        let [deg, had_deg] =
-            [after, before].map(|end| end.reached.rotation.angle_to(&before.commanded.rotation).to_degrees());
-        (deg > had_deg + FREE_DEG)
-            .then(|| format!("{} ends turned by {deg:.1}° from what the original intends", is.instruction))
+        None
+    }
+
+    /// What is wrong with the orientation at the end or at the circle point of a motion, which the figures of the tool's point do not show:
+    /// a tool that is turned about its tip cuts with another face.
+    fn turned_off(&self, index: usize, partner: usize) -> Option<String> {
+        let [was, is] = [&self.original.motions[index], &self.rewritten.motions[partner]];
+        let (before, after) = (self.before[index]?, self.after[partner]?);
+        let off_deg = |end: &ExecutedEnd, reached: &Pose, intended: &Pose| {
+            let turns = self.reached_alike(end, reached).into_iter();
+            turns.map(|turn| turn.angle_to(&intended.rotation).to_degrees()).fold(f64::INFINITY, f64::min)
+        };
+        let ends = [after, before].map(|end| off_deg(end, &end.reached, &before.commanded));
+        if let Some(deg) = beyond(ends) {
+            return Some(format!(
+                "{} ends turned by {deg:.1}° from what the original intends",
+                is.instruction
+            ));
+        }
+        if is.kind != MotionKind::Circular {
+            return None;
+        }
+        let intended = was.via()?.value.ok()?.cartesian()?.pose();
+        let at_via = |end: &ExecutedEnd| Some(off_deg(end, end.on_the_way.first()?, &intended));
+        let deg = beyond([at_via(after)?, at_via(before)?])?;
+        Some(format!(
+            "{} is turned by {deg:.1}° at its circle point from what the original intends",
+            is.instruction
+        ))
+    }
+
+    /// The orientation of the tool as reached, and as it would be reached if the placement of the cuts were corrected too.
+    fn reached_alike(&self, end: &ExecutedEnd, reached: &Pose) -> Vec<UnitQuaternion<f64>> {
+        let object = end.base_from_object.rotation;
+        let placed =
+            |kept: &KeptPlacement| object.inverse() * kept.rotation().inverse() * object * reached.rotation;
+        std::iter::once(reached.rotation).chain(self.placements.iter().map(placed)).collect()
     }
 
     /// The deviation at the nearest motion of a cut, and how far from a motion that is (mm). One path has one placement, whatever its frames.
@@ -292,6 +334,14 @@ impl Compared<'_> {
                     if let Some(what) = partner.and_then(|partner| self.inserted_otherwise(added, partner)) {
                         found.push(added, what);
                     }
+                    if let Some(deg) =
+                        owner[added].and_then(|index| self.turned_off_path_deg(added, index, mm))
+                    {
+                        found.push(
+                            added,
+                            format!("an added motion that ends turned by {deg:.1}° off the original path"),
+                        );
+                    }
                 }
                 Some((mm, _)) => {
                     found.push(added, format!("an added motion that ends {mm:.1} mm off the original path"))
@@ -341,6 +391,22 @@ impl Compared<'_> {
         Some((distance_mm(&way, &self.after[added]?.reached), bound_mm))
     }
 
+    /// By how much an inserted target is turned off the way of an original motion (°), if by more than a correction leaves. The tool may lead
+    /// or lag along that way: of the orientations nearby the nearest counts.
+    fn turned_off_path_deg(&self, added: usize, index: usize, off_mm: f64) -> Option<f64> {
+        let (way, bound_mm) = self.way_of(index)?;
+        let end = self.after[added]?;
+        let reached = self.reached_alike(end, &end.reached);
+        let deg = least_turn_deg(&way, &end.reached, &reached, off_mm.max(bound_mm));
+        let off_deg = |end: Option<&ExecutedEnd>, of: usize| {
+            Some(turn_deg(&self.after[self.partners[of]?]?.reached, &end?.commanded))
+        };
+        let start = self.original.motions[index].previous.map(|start| start as usize);
+        let ends = [start, Some(index)].into_iter().flatten();
+        let beside_deg = ends.filter_map(|of| off_deg(self.before[of], of)).fold(0.0, f64::max);
+        (deg > FREE_DEG + (1.0 + FREE_SHARE) * beside_deg).then_some(deg)
+    }
+
     /// The way of an original motion, and how far what a correction writes for it may be off (mm).
     fn way_of(&self, index: usize) -> Option<(Curve, f64)> {
         let was = &self.original.motions[index];
@@ -379,10 +445,26 @@ fn is_same_value<T: PartialEq>(
     }
 }
 
-/// From where the original intends the end of a motion to where the arm comes, in the axes of the base (mm).
-fn deviation(intended: &ExecutedEnd, reached: &ExecutedEnd) -> Vector3<f64> {
-    let in_object = reached.reached.translation.vector - intended.commanded.translation.vector;
-    intended.base_from_object.rotation * in_object
+/// The angle between two orientations (°).
+fn turn_deg(a: &Pose, b: &Pose) -> f64 {
+    a.rotation.angle_to(&b.rotation).to_degrees()
+}
+
+/// A turn after the correction that the turn before it does not explain (°).
+fn beyond([after_deg, before_deg]: [f64; 2]) -> Option<f64> {
+    (after_deg > before_deg + FREE_DEG).then_some(after_deg)
+}
+
+/// The least angle between one of these orientations at a pose and those of a way within a distance along it (°).
+fn least_turn_deg(way: &Curve, pose: &Pose, reached: &[UnitQuaternion<f64>], within_mm: f64) -> f64 {
+    let share = nearest_share(way, pose);
+    let reach = if way.length_mm() > within_mm { within_mm / way.length_mm() } else { 1.0 };
+    let [from, to] = [share - reach, share + reach].map(|s| s.clamp(0.0, 1.0));
+    let turned_deg = way.turn_rad().to_degrees() * (to - from);
+    let steps = (turned_deg / TURN_STEP_DEG).ceil().clamp(1.0, MOST_TURN_STEPS) as usize;
+    let at = |k: usize| way.at(from + (to - from) * k as f64 / steps as f64).rotation;
+    let least = |k: usize| reached.iter().map(|turn| turn.angle_to(&at(k))).fold(f64::INFINITY, f64::min);
+    (0..=steps).map(least).fold(f64::INFINITY, f64::min).to_degrees()
 }
 
 /// How a correction moves the end of a motion, in the work object (mm).
@@ -391,28 +473,30 @@ fn correction(before: &ExecutedEnd, after: &ExecutedEnd) -> Vector3<f64> {
 }
 
 /// The way of a motion.
-fn way(motion: &Motion, from: Pose, to: Pose) -> Option<Curve> {
+pub(super) fn way(motion: &Motion, from: Pose, to: Pose) -> Option<Curve> {
     if motion.kind == MotionKind::Linear {
         return Some(Curve::line(from, to));
     }
     Curve::round(from, &motion.via()?.value.ok()?.cartesian()?.pose(), to, motion)
 }
 
+/// The share of a way that is nearest to a pose, between its ends.
+pub(super) fn nearest_share(way: &Curve, pose: &Pose) -> f64 {
+    if way.arc().is_some() {
+        return way.passes(pose);
+    }
+    let along = way.to.translation.vector - way.from.translation.vector;
+    let square = along.norm_squared();
+    if square > 0.0 {
+        ((pose.translation.vector - way.from.translation.vector).dot(&along) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
+}
+
 /// Distance of a pose from a way between its ends (mm).
 fn distance_mm(way: &Curve, pose: &Pose) -> f64 {
-    let at = pose.translation.vector;
-    let share = if way.arc().is_some() {
-        way.passes(pose)
-    } else {
-        let along = way.to.translation.vector - way.from.translation.vector;
-        let square = along.norm_squared();
-        if square > 0.0 {
-            ((at - way.from.translation.vector).dot(&along) / square).clamp(0.0, 1.0)
-        } else {
-            0.0
-        }
-    };
-    (way.at(share).translation.vector - at).norm()
+    (way.at(nearest_share(way, pose)).translation.vector - pose.translation.vector).norm()
 }
 
 /// Whether a correction can turn one form into the other: it writes joints for poses, and straight segments for circles.

@@ -1,5 +1,6 @@
 //! Where a motion ends when an arm runs it.
 
+use nalgebra::Vector3;
 use truegrind_arm::estimated::RegisteredFrame;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
@@ -8,6 +9,7 @@ use truegrind_math::se3::Pose;
 #[derive(Debug, Clone)]
 pub(crate) struct ExecutedEnd {
     pub(crate) motion: usize,
+    pub(crate) frames_index: usize,
     /// Commanded pose in the work object.
     pub(crate) commanded: Pose,
     pub(crate) joints: Joints,
@@ -29,4 +31,10 @@ pub(crate) fn by_motion(ends: &[ExecutedEnd], motions: usize) -> Vec<Option<&Exe
         out[end.motion] = Some(end);
     }
     out
+}
+
+/// From where the original intends the end of a motion to where the arm comes, in the axes of the base (mm).
+pub(crate) fn deviation(intended: &ExecutedEnd, reached: &ExecutedEnd) -> Vector3<f64> {
+    let in_object = reached.reached.translation.vector - intended.commanded.translation.vector;
+    intended.base_from_object.rotation * in_object
 }

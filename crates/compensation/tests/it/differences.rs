@@ -1,10 +1,12 @@
 //! A program that was corrected differs from its original in its targets alone; whatever else differs is told by line.
 
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::deviation::{After, PathReport};
 use truegrind_compensation::options::{Circles, Emit, Options};
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind_programs::rapid::Task;
 
@@ -52,6 +54,7 @@ fn judged(original: &str, program: &str) -> PathReport {
         program: "p.mod",
         name: "test",
         after: After::PredictedRemainder,
+        tolerance_mm: Options::default().tolerance_mm,
         loads: [None, None],
     };
     let acting =
@@ -144,6 +147,103 @@ fn a_circle_point_that_moves_otherwise_than_its_motion_is_told() {
         let edited = text.replace(line, &line.replacen(number, &moved.to_string(), 1));
         let found = judged(&program(), &edited).differences;
         assert!(found.len() == 1 && found[0].contains("the circle point is"), "{found:?}");
+    }
+}
+
+/// The line with the tool turned about an axis, at the target with this number in it.
+fn turned(line: &str, target: usize, axis: usize, deg: f64) -> String {
+    let start = line.match_indices("[[").nth(target).unwrap().0;
+    let quaternion = start + line[start..].find("],[").unwrap() + 3;
+    let end = quaternion + line[quaternion..].find(']').unwrap();
+    let q: Vec<f64> = line[quaternion..end].split(',').map(|word| word.parse().unwrap()).collect();
+    let mut about = Vector3::zeros();
+    about[axis] = deg.to_radians();
+    let was = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
+    let now = (was * UnitQuaternion::from_scaled_axis(about)).into_inner();
+    let [w, i, j, k] = [now.w, now.i, now.j, now.k];
+    format!("{}{w:.7},{i:.7},{j:.7},{k:.7}{}", &line[..quaternion], &line[end..])
+}
+
+/// A tool that is turned about its tip stays at its target, and cuts with another face.
+#[test]
+fn a_tool_that_is_turned_at_its_target_is_told() {
+    let text = corrected(&plain());
+    let first = text.lines().find(|line| line.contains("MoveL")).unwrap();
+    let round = text.lines().find(|line| line.contains("MoveC")).unwrap();
+    let dense = corrected(&Options { tolerance_mm: 0.001, ..plain() });
+    let inserted = dense.lines().find(|line| line.contains("MoveL")).unwrap();
+    for (text, line, target, words) in [
+        (&text, first, 0, "MoveL ends turned by"),
+        (&text, round, 0, "at its circle point"),
+        (&text, round, 1, "MoveC ends turned by"),
+        (&dense, inserted, 0, "an added motion that ends turned by"),
+    ] {
+        for (axis, deg) in [(0, 0.7), (1, 3.0), (2, -12.0)] {
+            let edited = text.replace(line, &turned(line, target, axis, deg));
+            let found = judged(&program(), &edited).differences;
+            let found: Vec<&String> =
+                found.iter().filter(|sentence| !sentence.contains("configuration")).collect();
+            assert!(
+                found.len() == 1 && found[0].contains(words),
+                "{words} {axis} {deg}: {found:?}\n{edited}"
+            );
+        }
+        // As little as another model turns it.
+        let edited = text.replace(line, &turned(line, target, 0, 0.1));
+        assert_eq!(judged(&program(), &edited).differences, Vec::<String>::new());
+    }
+}
+
+/// Lines so long that a correction inserts targets, and an arc.
+fn long() -> String {
+    program().replace("16.0,20.0]", "160.0,20.0]").replace("[60.0,80.0", "[60.0,79.0")
+}
+
+/// Deleting all inserted targets leaves every target of the original where it belongs.
+#[test]
+fn the_path_between_targets_is_judged_as_the_correction_judges_it() {
+    let known = estimated(perturbed(3, 1.0), &[Joints::zeros()]);
+    let tolerance_mm = Options::default().tolerance_mm;
+    for (emit, circles) in [
+        (Emit::Targets, Circles::Keep),
+        (Emit::Targets, Circles::Segments),
+        (Emit::Joints, Circles::Segments),
+    ] {
+        let options = Options { emit, circles, ..Options::default() };
+        let (plan, text) = rewritten(long().as_bytes(), &known, &Cell::default(), &options);
+        let text = String::from_utf8(text).unwrap();
+        assert!(plan.outcomes.iter().map(|outcome| outcome.inserted).sum::<u32>() > 0);
+        let report = judged(&long(), &text);
+        assert_eq!(report.differences, Vec::<String>::new());
+        let between = report.between.unwrap();
+        let flagged = plan
+            .outcomes
+            .iter()
+            .filter(|outcome| matches!(outcome.reason(), Some(OutcomeReason::PathDeviation { .. })));
+        assert_eq!(between.beyond, flagged.count(), "{between:?}");
+        let planned =
+            plan.outcomes.iter().filter_map(|outcome| outcome.path_deviation_mm.get()).fold(0.0, f64::max);
+        let found = between.largest_mm.unwrap();
+        assert!((found - planned).abs() < 0.005, "{found} {planned}");
+        // The same without the inserted targets.
+        let bare = Options { tolerance_mm: 1e3, circles: Circles::Keep, ..Options::default() };
+        let (plan, text) = rewritten(long().as_bytes(), &known, &Cell::default(), &bare);
+        let between = judged(&long(), &String::from_utf8(text).unwrap()).between.unwrap();
+        let planned =
+            plan.outcomes.iter().filter_map(|outcome| outcome.path_deviation_mm.get()).fold(0.0, f64::max);
+        assert!(planned > tolerance_mm && between.beyond > 0, "{planned} {between:?}");
+        assert!((between.largest_mm.unwrap() - planned).abs() < 0.005, "{planned} {between:?}");
+    }
+}
+
+/// With another model than the correcting one all of a path is off alike; what is between its targets is none the worse for it.
+#[test]
+fn another_model_and_a_placement_that_is_kept_do_not_alarm() {
+    for (seed, share) in [(3, 0.85), (3, 1.1), (3, 0.5)] {
+        let known = estimated(perturbed(seed, share), &[Joints::zeros()]);
+        let (_, text) = rewritten(long().as_bytes(), &known, &Cell::default(), &Options::default());
+        let between = judged(&long(), &String::from_utf8(text).unwrap()).between.unwrap();
+        assert_eq!(between.beyond, 0, "{share}: {between:?}");
     }
 }
 

@@ -116,6 +116,7 @@ fn run_on(actual: &Model, original: &[u8], program: &[u8], cell: &Cell) -> PathR
         program: "p.mod",
         name: "test",
         after: After::Achieved,
+        tolerance_mm: Options::default().tolerance_mm,
         loads: [None, None],
     };
     let nominal = nominal();

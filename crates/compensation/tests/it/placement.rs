@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use truegrind_arm::estimated::Estimated;
+use truegrind_arm::estimated::{Estimated, EstimatedParameter};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
@@ -474,4 +474,41 @@ fn a_cut_that_would_too_likely_get_worse_is_left_whole_with_that_reason() {
         taken.outcomes.iter().all(|outcome| !matches!(outcome.reason(), Some(OutcomeReason::Risk { .. })))
     );
     assert!(taken.probability_of_harm.unwrap() < 0.5);
+}
+
+/// Whether σ is what the readings scatter or a tolerance of which they show nothing makes a difference to who has to measure again.
+#[test]
+fn sigma_that_no_reading_has_seen_is_told_as_such() {
+    let (source, joints) = passes();
+    let mut drawn = Drawn::about(7, &joints, 3.0);
+    let said = |known: &Estimated| {
+        let options = Options { max_risk: 1.0, ..with(Placement::Absolute) };
+        let (plan, _) = rewritten(&source, known, &Cell::default(), &options);
+        let note = plan.notes.iter().find(|note| note.contains("could not show")).cloned();
+        (plan.cuts.iter().map(|cut| cut.sigma_mm).fold(0.0, f64::max), note)
+    };
+    let names: Vec<String> = drawn.known.order.iter().map(ToString::to_string).collect();
+    drawn.known.parameters = names
+        .iter()
+        .map(|name| EstimatedParameter {
+            name: name.clone(),
+            unit: String::new(),
+            nominal: 0.0,
+            value: 0.0,
+            sigma: 1.0,
+            prior_sigma: None,
+            determined: 0.99,
+        })
+        .collect();
+    let (sigma_mm, note) = said(&drawn.known);
+    assert_eq!(note, None);
+    drawn.known.parameters.iter_mut().for_each(|one| one.determined = 0.1);
+    let (same_mm, note) = said(&drawn.known);
+    assert_eq!(sigma_mm, same_mm);
+    let note = note.unwrap();
+    assert!(
+        note.contains(&format!("of the {sigma_mm:.3} mm (1σ) stated for a cut, {sigma_mm:.3} mm")),
+        "{note}"
+    );
+    assert!(names.iter().any(|name| note.contains(name)), "{note}");
 }

@@ -417,7 +417,7 @@ fn a_called_program_that_is_not_read_is_named() {
         plan(&task.listing, &known(), &Cell::default(), &Options::default()).notes
     };
     let found = notes(&format!("{go}\nM98 P2000\n{go}\nM98 P3000\n{go}"));
-    let note = found.iter().find(|note| note.contains("is not in the same file")).unwrap();
+    let note = found.iter().find(|note| note.contains("calls another program that is not followed")).unwrap();
     assert!(note.starts_with("2 blocks call") && note.ends_with("(lines 7, 9)"), "{note}");
     assert!(!notes(go).iter().any(|note| note.contains("in the same file")));
 }

@@ -164,6 +164,7 @@ fn a_corrected_program_starts_in_the_branch_of_the_original() {
             program: "p.nc",
             name: "test",
             after: After::Achieved,
+            tolerance_mm: Options::default().tolerance_mm,
             loads: [None, None],
         };
         verify(&judged, &acting).points.remove(0)

@@ -113,6 +113,7 @@ fn parts(count: usize) -> Parts {
         points,
         missing: None,
         differences: Vec::new(),
+        between: None,
         held_out_mm: Some(0.08),
     };
     Parts { nominal, actual, reports: vec![report], triangles: surface.tessellate(20), base_from_object }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use super::Lattice;
+use super::lattice::Lattice;
 
 /// An edge of a graph: from, to, and what happens to the facts along it.
 pub(crate) type Edge<E> = (u32, u32, E);

@@ -8,7 +8,7 @@
 use std::collections::{HashMap, HashSet};
 use std::hash::Hash;
 
-use super::Lattice;
+use super::lattice::Lattice;
 
 /// How many passes a text gets: each level of calls and loops takes one.
 const PASSES: usize = 9;

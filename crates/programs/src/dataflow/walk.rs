@@ -1,6 +1,6 @@
 //! The transfer function of a language, taken over the statements of its tree.
 
-use super::Lattice;
+use super::lattice::Lattice;
 
 /// What a node is for the flow of control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

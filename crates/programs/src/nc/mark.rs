@@ -94,6 +94,8 @@ pub fn place(tree: &NcTree<'_>, dialect: Dialect) -> usize {
                     || upper.starts_with(b"PROC ")
                     || matches!(upper.first(), Some(b'O' | b':'))
                         && upper.get(1).is_some_and(u8::is_ascii_digit)
+                    // The name of a program of a Fanuc 30i.
+                    || dialect.paren_comments() && line.starts_with(b"<") && line.contains(&b'>')
             }
         };
         // Empty lines before header lines are skipped.

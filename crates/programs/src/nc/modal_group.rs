@@ -66,6 +66,8 @@ pub(super) enum ModalGroup {
     RotaryOffset,
     /// FUNCTION TCPM REFPNT: 1 where the programmed point is not the tip.
     ReferencePoint,
+    /// PTP, CP: 1 where the joints lead to the end, on a path that is no line.
+    PointToPoint,
     // Groups that matter for some motions only.
     /// G90.1, G91.1: absolute or incremental arc centres.
     ArcCentreMode,
@@ -162,6 +164,11 @@ impl GroupTable {
     pub(super) fn mark_unknown_by_word(&mut self, groups: u32, because: Reason) {
         self.unknown_by_word |= groups;
         self.word_reason = because;
+    }
+
+    /// Whether the value of a group depends on the path to here.
+    pub(super) fn is_unknown_after_join(&self, group: ModalGroup) -> bool {
+        self.unknown_after_join & group.bit() != 0
     }
 
     /// Why one of these groups is unknown; `None` where all are known.

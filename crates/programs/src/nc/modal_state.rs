@@ -6,6 +6,7 @@ use super::dialect::Dialect;
 use super::expression::{Evaluated, Variable};
 use super::modal_group::{ALL_GROUPS, GroupTable, ModalGroup};
 use super::orientation::{Angles, spun};
+use super::preceding::Preceding;
 use crate::dataflow::Lattice;
 use crate::motion::{Frame, Reason};
 use crate::persistent_map::Map;
@@ -317,8 +318,8 @@ pub(super) struct ModalState {
     pub(super) variables: Variables,
     /// The state that M70 has saved.
     pub(super) saved: Option<Box<ModalState>>,
-    /// The motion before this block, where every path has the same one.
-    pub(super) previous: Option<u32>,
+    /// The motions before this block.
+    pub(super) preceding: Preceding,
 }
 
 /// The modal state that determines how the words of a straight block are read. A block that is inserted before another is
@@ -380,7 +381,7 @@ impl ModalState {
             pole: [Err(Reason::PositionUnknown); 2],
             variables: Variables::default(),
             saved: None,
-            previous: None,
+            preceding: Preceding::default(),
         }
     }
 
@@ -404,7 +405,7 @@ impl ModalState {
         self.mode_before_cycle = self.mode;
         self.feed.rate = Err(because);
         self.pole = [Err(because); 2];
-        self.previous = None;
+        self.preceding.meet();
         self.saved = None;
         self.position = [Err(because); 3];
         self.orientation = Orientation::unknown(because, Err(because));
@@ -430,12 +431,12 @@ impl ModalState {
         self.pole = [Err(because); 2];
         self.variables.invalidate(because);
         self.tool.next = None;
-        self.previous = None;
+        self.preceding = Preceding::default();
     }
 
     pub(super) fn invalidate_position(&mut self) {
         self.position = [Err(Reason::PositionUnknown); 3];
-        self.previous = None;
+        self.preceding = Preceding::default();
     }
 
     pub(super) fn invalidate_orientation(&mut self) {
@@ -513,9 +514,7 @@ impl Lattice for ModalState {
             self.saved = None;
         }
         self.variables.join(&other.variables);
-        if self.previous != other.previous {
-            self.previous = None;
-        }
+        self.preceding.join(&other.preceding);
     }
 }
 

@@ -10,6 +10,9 @@
 //! ; truegrind start [0,10,-5,0,85,0]
 //! ```
 
+use std::collections::BTreeSet;
+
+use super::called::program_of;
 use super::dialect::{Dialect, SAMPLE, lines};
 use super::orientation::Angles;
 use crate::motion::{FARTHEST_MM, Frame, ToolValue};
@@ -27,9 +30,17 @@ pub struct Setup {
     pub tools: Vec<(String, Frame)>,
     /// Work offsets by name (`G54`).
     pub frames: Vec<(String, Frame)>,
+    /// Programs that others of the same run call, by [`called_programs`](super::called::called_programs): what holds at their start is
+    /// the caller's.
+    pub called: BTreeSet<String>,
 }
 
 impl Setup {
+    /// Whether others call this file.
+    pub(super) fn is_called(&self, file: &str) -> bool {
+        !self.called.is_empty() && self.called.contains(&*String::from_utf8_lossy(&program_of(file)))
+    }
+
     /// The tool frame of a name.
     pub fn tool(&self, name: &str) -> Option<Frame> {
         find(&self.tools, name)

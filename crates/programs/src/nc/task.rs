@@ -22,6 +22,7 @@ mod paths;
 mod block;
 mod shift;
 mod turn;
+mod unstated;
 mod file_scan;
 mod prescan;
 mod tools;
@@ -111,6 +112,7 @@ impl<'s> Task<'s> {
                 Interpreter::new(&task.trees[file], file as u32, task.dialects[file], setup);
             // Siemens: the extension of a subprogram.
             interpreter.scan.is_subprogram = task.names[file].to_ascii_lowercase().ends_with(".spf");
+            interpreter.is_called = setup.is_called(&task.names[file]);
             interpreter.files = files.len();
             interpreter.listing = std::mem::take(&mut task.listing);
             interpreter.events = std::mem::take(&mut task.events);
@@ -179,6 +181,8 @@ pub(super) struct Interpreter<'t, 's> {
     returns_are_common: bool,
     /// How many files are read together.
     files: usize,
+    /// Whether a program outside these files calls this one.
+    is_called: bool,
     pass: Pass,
     /// Variables that the file has assigned so far.
     assigned_variables: HashSet<Variable>,
@@ -294,6 +298,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             paths: None,
             returns_are_common: false,
             files: 1,
+            is_called: false,
             pass: Pass::default(),
             assigned_variables: HashSet::new(),
             block: None,
@@ -328,6 +333,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         }
         self.comments();
         self.prescan();
+        self.scan.is_subprogram |= self.is_called;
         let lengths = self.lengths();
         let start = self.state.clone();
         self.interpret_file();
@@ -381,6 +387,8 @@ impl<'t, 's> Interpreter<'t, 's> {
     ) {
         self.listing.motions.truncate(motions);
         self.listing.nc.external_calls.retain(|call| (*call as usize) < motions);
+        self.listing.nc.unstated.retain(|motion, _| (*motion as usize) < motions);
+        self.listing.predecessors.split_off(&(motions as u32));
         self.listing.speeds.truncate(speeds);
         self.listing.zones.truncate(zones);
         self.listing.tools.truncate(tools);

@@ -130,6 +130,8 @@ pub(super) trait Visitor {
     fn record_external_call(&mut self, modal: SwitchSet);
     /// A displacement is counted from the robot's current position.
     fn record_position_use(&mut self, reaching: &ReachingMotions);
+    /// The program decides by the robot's current position, in the expression at a node.
+    fn record_position_decision(&mut self, unit: Unit, node: u32, reaching: &ReachingMotions);
     /// The next cycle enters main with these switches and this load.
     fn record_cycle_restart(&mut self, modal: SwitchSet, gripped: Gripped);
 }
@@ -269,6 +271,7 @@ impl Transfer for Interpreter<'_, '_, '_> {
 
     fn transfer(&mut self, node: u32, nesting: Nesting) {
         let mut state = std::mem::take(&mut self.state);
+        self.note_position_decisions(node, &state);
         match self.kind(node) {
             Syntax::Call | Syntax::LateCall => self.transfer_call(node, &mut state, nesting),
             Syntax::Assignment => self.transfer_assignment(node, &mut state),
@@ -310,6 +313,7 @@ impl Transfer for Interpreter<'_, '_, '_> {
 
     fn evaluate(&mut self, node: u32) {
         let mut state = std::mem::take(&mut self.state);
+        self.note_position_decisions(node, &state);
         self.invalidate_changed(node, &mut state);
         self.state = state;
     }
@@ -356,6 +360,27 @@ impl Transfer for Interpreter<'_, '_, '_> {
 impl Interpreter<'_, '_, '_> {
     fn kind(&self, node: u32) -> Syntax {
         self.evaluator.trees[self.unit.file as usize].nodes.kind(node)
+    }
+
+    /// Records decisions by the robot's position in a statement or expression, and in the functions that it calls.
+    fn note_position_decisions(&mut self, node: u32, state: &AbstractState) {
+        let symbols = self.evaluator.symbols;
+        if symbols.position_decisions.is_empty() {
+            return;
+        }
+        let tree = &self.evaluator.trees[self.unit.file as usize];
+        for node in node..tree.nodes.behind(node) {
+            let decides = match tree.nodes.kind(node) {
+                Syntax::Function | Syntax::Call => {
+                    let called = symbols.callees(self.unit.scope, tree.text(tree.nodes.first(node)));
+                    called.iter().any(|routine| symbols.effects_of(*routine).decides_by_position)
+                }
+                _ => false,
+            };
+            if decides || symbols.position_decisions.contains(&(self.unit.file, node)) {
+                self.visitor.record_position_decision(self.unit, node, &state.reaching);
+            }
+        }
     }
 
     /// The routine ends in a state.

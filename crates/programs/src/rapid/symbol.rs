@@ -7,13 +7,15 @@
 mod effects;
 pub(super) mod facts;
 mod late_binding;
+mod position_reads;
 mod purity;
 mod solve;
 mod writes;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 pub use self::effects::{SideEffects, Write, WriteKind};
+use self::position_reads::position_decisions;
 use super::instruction;
 use super::modal::{Switch, SwitchSet};
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
@@ -178,6 +180,8 @@ pub struct Symbols {
     pub states_loads: bool,
     /// Whether any statement may depend on the robot's current position (PDispOn without \ExeP).
     pub(super) uses_position: bool,
+    /// File and node of each function that reads the robot's position for a decision.
+    pub(super) position_decisions: BTreeSet<(u32, u32)>,
     /// Whether anything depends on which motions may be the last executed: the robot's position, a configuration that is not
     /// monitored, or a call of a routine that moves.
     pub(super) tracks_motions: bool,
@@ -200,11 +204,15 @@ impl Symbols {
         }
         symbols.declare_loop_variables(trees);
         symbols.collect_namesakes(trees);
+        symbols.position_decisions = position_decisions(trees);
         symbols.solve_effects(trees);
         symbols.uses_position = symbols.may_use_position();
         let sets = |switch: Switch| !symbols.all_switches.is_unset(switch);
         let may_unmonitor = sets(Switch::ConfLinear) || sets(Switch::ConfJoint);
-        symbols.tracks_motions = symbols.uses_position || may_unmonitor || symbols.calls_motions();
+        symbols.tracks_motions = symbols.uses_position
+            || !symbols.position_decisions.is_empty()
+            || may_unmonitor
+            || symbols.calls_motions();
         symbols
     }
 

@@ -92,6 +92,7 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Loads, Vec<b
     builder.insert_literals(&literals);
     builder.resolve_entry_switches();
     builder.refuse_motions_before_displacement();
+    builder.list_position_decisions();
     builder.other_uses();
     builder.declared_tools();
     (builder.listing.across_calls, builder.listing.predecessors) =
@@ -155,6 +156,8 @@ struct ListingBuilder<'a, 's> {
     /// The units in which one is counted from the robot's position at their entry. A call determines that position; a new cycle,
     /// an interrupt and an unknown caller do not.
     position_used_at_entry: Vec<u32>,
+    /// Decisions by the position whose motions are not all known: unit, whether only those before the unit are open, and place.
+    position_decisions: Vec<(u32, bool, Place)>,
     names: Vec<Option<Arc<str>>>,
     /// The line of the last place.
     line: Cell<u32>,
@@ -220,6 +223,7 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             totals: HashMap::new(),
             position_used: false,
             position_used_at_entry: Vec::new(),
+            position_decisions: Vec::new(),
             names: vec![None; INSTRUCTIONS.len()],
             line: Cell::new(0),
             routines: vec![None; symbols.routines.len()],
@@ -439,6 +443,26 @@ impl Visitor for ListingBuilder<'_, '_> {
         }
         if standing.entry {
             self.position_used_at_entry.push(self.unit);
+        }
+    }
+
+    fn record_position_decision(&mut self, unit: Unit, node: u32, standing: &ReachingMotions) {
+        if self.depth > 0 {
+            return;
+        }
+        if let Some(motions) = standing.motions() {
+            for motion in motions {
+                self.listing.motions[motion as usize].own_reason.get_or_insert(Reason::BeforeDisplacement);
+            }
+        }
+        if standing.motions().is_none() || standing.entry || standing.elsewhere {
+            let tree = &self.trees[unit.file as usize];
+            let (line, column) = tree.line_column(tree.start(tree.nodes.first(node)));
+            self.position_decisions.push((
+                self.unit,
+                standing.entry,
+                Place { file: unit.file, line, column },
+            ));
         }
     }
 

@@ -488,3 +488,39 @@ fn predefined_names_stand_in_order() {
         assert_eq!(effect(name.as_bytes()), None, "{name}");
     }
 }
+
+/// At the corrected end of a motion CRobT reads another place than the text states, and a program that compares it would take the other
+/// branch: the end stays where it is. What cannot be laid to single motions is listed.
+#[test]
+fn a_motion_keeps_the_end_by_which_the_program_decides() {
+    let p = "CONST robtarget p:=[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nVAR robtarget c;\nVAR pos o;\n";
+    let go = "MoveL p,v100,fine,tool0;\n";
+    let inpos = "FUNC bool inpos(robtarget at)\nVAR robtarget now;\nnow:=CRobT(\\Tool:=tool0);\n\
+                 RETURN Distance(now.trans,at.trans)<1;\nENDFUNC\n";
+    let decided = |body: &str| {
+        let inpos = if body.contains("inpos") { inpos } else { "" };
+        let source = format!(
+            "MODULE M\n{p}PROC main()\nconfl;\n{body}ENDPROC\nPROC confl()\nConfL\\On;\nENDPROC\n{inpos}ENDMODULE\n"
+        );
+        let listing = Task::read(&[("m.mod", source.as_bytes())]).listing;
+        let reasons: Vec<_> = listing.motions.iter().map(|motion| motion.own_reason).collect();
+        (reasons, listing.position_decisions.len())
+    };
+    let kept = Some(Reason::BeforeDisplacement);
+    for condition in [
+        "c:=CRobT(\\Tool:=tool0);\nIF Distance(c.trans,p.trans)<0.5 THEN\n",
+        "o:=CPos();\nIF o.x>100 THEN\n",
+        "IF inpos(p) THEN\n",
+        "IF CRobT()=p THEN\n",
+    ] {
+        assert_eq!(decided(&format!("{go}{condition}{go}ENDIF\n")), (vec![kept, None], 0), "{condition}");
+    }
+    // Before the first motion the robot stands anywhere.
+    assert_eq!(decided(&format!("IF inpos(p) RETURN;\n{go}")), (vec![None], 1));
+    // A position that is only shown or moved from decides nothing.
+    for harmless in
+        ["c:=CRobT(\\Tool:=tool0);\nTPWrite \"z\" \\Num:=c.trans.z;\n", "TPWrite \"at\" \\Pos:=CPos();\n"]
+    {
+        assert_eq!(decided(&format!("{go}{harmless}{go}")), (vec![None, None], 0), "{harmless}");
+    }
+}

@@ -683,6 +683,16 @@ fn the_mark_stands_behind_that_of_utf_8() {
     assert_eq!(mark::place(&task.trees[0], Dialect::Siemens), 3);
 }
 
+/// A Fanuc 30i takes a comment before the name for the program's first block.
+#[test]
+fn the_mark_stands_behind_the_name_of_a_program() {
+    for head in ["%\n<FACE>\n", "%\r\n<FACE> (ROUGH)\r\n", "%\nO0101\n", "%\n:0101\n"] {
+        let source = format!("{head}(truegrind angles wpr)\nG43.4 H1\nG1 X1. Y2. Z3.\n%\n");
+        let task = Task::read(&[("x.nc", source.as_bytes())], &Setup::default());
+        assert_eq!(mark::place(&task.trees[0], Dialect::Fanuc), head.len(), "{head}");
+    }
+}
+
 /// `;` ends a block on a Fanuc: "X5. ; Y7." was read as one block with a comment, and Y7. was left out without a word. An unclosed comment
 /// swallows the blocks behind it.
 #[test]

@@ -69,7 +69,8 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
         ),
         (
             depends_on_call(plan, listing),
-            "Corrected, but a called program that is not given may change what holds behind its call: give it too, or check these motions",
+            "Corrected, but a call of another program may change what holds behind it, as each NC program is read by itself: state it again \
+             behind the call, or check these motions",
         ),
         (
             !plan.unstated_axes.is_empty(),
@@ -122,16 +123,23 @@ fn reasons(plan: &Plan, listing: &Listing) -> Vec<String> {
     reasons.extend(at_risk_reason(plan));
     reasons.extend(placement::risk(plan).filter(|_| !is_again(listing)));
     if is_any_written && count(plan, MotionStatus::Refused) > 0 {
-        reasons.push(
-            "refused motions are not corrected: between them and their corrected neighbours the path steps by the size of the correction"
-                .to_owned(),
-        );
+        reasons.push(refused_steps(plan));
     }
     reasons.extend(plan.steps.as_ref().map(|steps| steps.sentence(listing)));
     reasons.extend(cuts_reason(plan));
     reasons.extend(opaque_reason(listing));
     reasons.extend(inserted_reason(plan));
     reasons
+}
+
+/// The steps beside refused motions, with the largest correction of the program: none of them is larger.
+fn refused_steps(plan: &Plan) -> String {
+    let corrected = plan.outcomes.iter().filter(|outcome| outcome.status.is_written());
+    let most_mm = corrected.filter_map(|outcome| outcome.before_mm.get()).reduce(f64::max);
+    let size = most_mm.map_or_else(String::new, |mm| format!(", here up to about {mm:.2} mm"));
+    format!(
+        "refused motions are not corrected: between them and their corrected neighbours the path steps by the size of the correction{size}"
+    )
 }
 
 fn left_cycles_reason(listing: &Listing) -> Option<String> {
@@ -261,7 +269,8 @@ fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
         };
         let (before, after) = (of.before_mm, of.expected_mm?);
         Some(format!(
-            "largest deviation of the corrected motions{kind}: {before:.3} mm before, {after:.3} mm expected after (1σ)"
+            "largest deviation of the corrected motions{kind}: {before:.3} mm before; after correction a standard deviation (1σ) of at most \
+             {after:.3} mm is expected"
         ))
     };
     found.iter().filter_map(of_kind).collect()

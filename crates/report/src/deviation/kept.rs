@@ -7,7 +7,7 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 use truegrind_arm::model::Joints;
 use truegrind_arm::region::Outside;
-use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport};
+use truegrind_compensation::deviation::{After, BetweenTargets, Deviation, PathPoint, PathReport};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
 
@@ -29,7 +29,8 @@ const KINDS: [(MotionKind, &str); 6] = [
 
 /// The record of a report.
 pub fn kept(report: &PathReport) -> Value {
-    let PathReport { program, files, model, after, points, missing, differences, held_out_mm } = report;
+    let PathReport { program, files, model, after, points, missing, differences, between, held_out_mm } =
+        report;
     let mut last = [String::new(), String::new()];
     let points: Vec<Value> = points.iter().map(|point| of_point(point, &mut last)).collect();
     json!({
@@ -40,6 +41,7 @@ pub fn kept(report: &PathReport) -> Value {
         "held_out_mm": held_out_mm.map(exact),
         "missing": missing,
         "differences": differences,
+        "between": between.as_ref().map(of_between),
         "points": points,
     })
 }
@@ -59,7 +61,36 @@ pub fn from_kept(value: &Value) -> Option<PathReport> {
         },
         missing: serde_json::from_value(value["missing"].clone()).ok()?,
         differences: serde_json::from_value(value["differences"].clone()).ok()?,
+        between: match &value["between"] {
+            Value::Null => None,
+            between => Some(to_between(between)?),
+        },
         points: points.map(|point| to_point(point, &mut last)).collect::<Option<_>>()?,
+    })
+}
+
+fn of_between(between: &BetweenTargets) -> Value {
+    let BetweenTargets { tolerance_mm, largest_mm, beyond, beyond_lines, unchecked, unchecked_lines } =
+        between;
+    json!([exact(*tolerance_mm), largest_mm.map(exact), beyond, beyond_lines, unchecked, unchecked_lines])
+}
+
+fn to_between(value: &Value) -> Option<BetweenTargets> {
+    let [tolerance_mm, largest_mm, beyond, beyond_lines, unchecked, unchecked_lines] =
+        value.as_array()?.as_slice()
+    else {
+        return None;
+    };
+    let number = |value: &Value| value.as_str()?.parse().ok();
+    let count = |value: &Value| usize::try_from(value.as_u64()?).ok();
+    let lines = |value: &Value| value.as_str().map(str::to_owned);
+    Some(BetweenTargets {
+        tolerance_mm: number(tolerance_mm)?,
+        largest_mm: if largest_mm.is_null() { None } else { Some(number(largest_mm)?) },
+        beyond: count(beyond)?,
+        beyond_lines: lines(beyond_lines),
+        unchecked: count(unchecked)?,
+        unchecked_lines: lines(unchecked_lines),
     })
 }
 

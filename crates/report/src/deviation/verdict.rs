@@ -4,7 +4,9 @@ use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
 use crate::document::Verdict;
 use crate::status::Status;
-use truegrind_compensation::deviation::{MissingMotions, PathPoint, PathReport, Status as MotionStatus};
+use truegrind_compensation::deviation::{
+    BetweenTargets, MissingMotions, PathPoint, PathReport, Status as MotionStatus,
+};
 use truegrind_compensation::line_list::numbered;
 use truegrind_programs::motion::Place;
 
@@ -25,6 +27,8 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
     for (report, before, after) in &judged {
         found.extend(of_path(report, *before, *after, all_worse));
         found.extend(steps(report).map(|words| (Status::Warning, words)));
+        found.extend(between_targets(report));
+        found.extend(turns(report));
         found.extend(of_certainty(report));
     }
     found.extend(missing(reports));
@@ -99,6 +103,52 @@ fn of_certainty(report: &PathReport) -> Option<Reason> {
         );
         (Status::Warning, words)
     })
+}
+
+/// The path between the targets of the corrected program.
+fn between_targets(report: &PathReport) -> Vec<Reason> {
+    let Some(between) = &report.between else { return Vec::new() };
+    let BetweenTargets { tolerance_mm, beyond_lines, unchecked_lines, .. } = between;
+    let mut out = Vec::new();
+    if let Some(mm) = between.largest_mm {
+        let off = if mm.is_finite() {
+            format!("leaves the intended lines and arcs by up to {mm:.3} mm")
+        } else {
+            "cannot be followed by the arm".to_owned()
+        };
+        out.push(match beyond_lines {
+            None => (
+                Status::Good,
+                format!("{}: between its targets the path {off} (tolerance {tolerance_mm} mm)", report.model),
+            ),
+            Some(lines) => (
+                Status::Warning,
+                format!(
+                    "{}: between its targets the path {off}, more than the tolerance of {tolerance_mm} mm ({lines})",
+                    report.model
+                ),
+            ),
+        });
+    }
+    if let Some(lines) = unchecked_lines {
+        let starts = if between.unchecked == 1 { "line or arc starts" } else { "lines or arcs start" };
+        let words = format!(
+            "{}: {} {starts} at a place that is unknown or not corrected: the path to its end is not checked ({lines})",
+            report.model, between.unchecked
+        );
+        out.push((Status::Good, words));
+    }
+    out
+}
+
+/// The orientation of the tool at the points of the cut.
+fn turns(report: &PathReport) -> Option<Reason> {
+    let [before, after] = [BEFORE, AFTER].map(|side| report.largest_turn_rad(side).map(f64::to_degrees));
+    let words = format!(
+        "{}: the tool is turned off its intended orientation by up to {:.3}° before, {:.3}° after",
+        report.model, before?, after?
+    );
+    Some((Status::Good, words))
 }
 
 /// Motions without a deviation, with the models under which they have none where these differ.
@@ -210,7 +260,7 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             // Both unsigned, since the expected deviation has no sign.
             let before = size(report);
             format!(
-                "Largest deviation {} before, {} expected after (1σ){}",
+                "Largest deviation {} before; after correction a standard deviation (1σ) of at most {} is expected{}",
                 known(before),
                 known(report.expected_mm()),
                 of_model(report),

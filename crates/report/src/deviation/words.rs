@@ -41,7 +41,9 @@ pub(super) fn named(report: &PathReport) -> String {
 
 pub(super) fn notes(report: &PathReport) -> Vec<String> {
     let mut notes = vec![
-        "Positions and vectors in the work object frame; d is reached minus intended position.".to_owned(),
+        "Positions and vectors in the work object frame; d is reached minus intended position; turn is the angle between reached \
+         and intended orientation of the tool."
+            .to_owned(),
         if report.points.iter().any(|point| point.normal.is_some()) {
             "\"normal\" is signed along the outward surface normal: positive is off the surface, negative is too deep."
                 .to_owned()

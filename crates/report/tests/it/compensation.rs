@@ -294,7 +294,9 @@ fn verdict_and_page_tell_what_to_look_at() {
         called.nc.external_calls = vec![call];
         let text = terminal::document(&view::summary(&plan, &called, &files), 200);
         assert_eq!(
-            text.contains("[warning] Corrected, but a called program that is not given"),
+            text.contains(
+                "[warning] Corrected, but a call of another program may change what holds behind it"
+            ),
             is_depended_on,
             "{text}"
         );
@@ -438,18 +440,18 @@ fn before_and_after_are_stated_of_the_same_motions() {
     let text = said(&plan);
     assert!(
         text.contains(
-            "corrected motions (shape and placement): 1.200 mm before, 0.558 mm expected after (1σ)"
+            "corrected motions (shape and placement): 1.200 mm before; after correction a standard deviation (1σ) of at most 0.558 mm is expected"
         ),
         "{text}"
     );
     assert!(
-        text.contains("corrected motions (shape only): 0.400 mm before, 0.003 mm expected after (1σ)"),
+        text.contains("corrected motions (shape only): 0.400 mm before; after correction a standard deviation (1σ) of at most 0.003 mm is expected"),
         "{text}"
     );
     // One kind alone.
     plan.placements[1].applied = Placement::Absolute;
     let text = said(&plan);
-    assert!(text.contains("corrected motions: 1.200 mm before, 0.600 mm expected after (1σ)"), "{text}");
+    assert!(text.contains("corrected motions: 1.200 mm before; after correction a standard deviation (1σ) of at most 0.600 mm is expected"), "{text}");
 }
 
 /// A program that was corrected before states numbers that were never intended: nothing refers to them.

@@ -66,6 +66,7 @@ fn report(model: &str, points: Vec<PathPoint>) -> PathReport {
         points,
         missing: None,
         differences: Vec::new(),
+        between: None,
         held_out_mm: Some(0.46),
     }
 }

@@ -10,6 +10,7 @@ use truegrind_calibration::identification::fit::Outlier;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
+use truegrind_calibration::identification::verdict::NOT_NOISE;
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_report::format::{csv, markdown, terminal};
 use truegrind_report::identification as view;
@@ -63,6 +64,33 @@ fn by_hand() -> Identification {
 
 fn text_of(cell: &Cell) -> &str {
     if let Cell::Text(text) = cell { text } else { panic!("{cell:?}") }
+}
+
+/// What moved between repetitions is no remark below `[ok]`.
+#[test]
+fn repeated_poses_that_show_more_than_noise_head_a_warning() {
+    let mut found = by_hand();
+    for status in [Judgement::NotEvaluated, Judgement::Pass] {
+        found.estimated.verdict.status = status;
+        found.estimated.verdict.reasons =
+            vec![format!("{NOT_NOISE}: they differ by 0.350 mm in one direction")];
+        let text = terminal::document(&view::summary(&found), 300);
+        assert!(text.contains("[warning] The model may be used"), "{text}");
+        assert!(text.contains("by 0.350 mm in one direction"), "{text}");
+        found.estimated.verdict.reasons.clear();
+        assert!(terminal::document(&view::summary(&found), 300).contains("[ok] The model may be used"));
+    }
+}
+
+/// A raster in one orientation: what holds at the target alone is said where the error is.
+#[test]
+fn a_target_that_the_poses_do_not_show_is_in_the_headline() {
+    let mut found = by_hand();
+    found.estimated.verdict.status = Judgement::NotEvaluated;
+    found.estimated.verdict.reasons =
+        vec!["these poses, of one kind, do not show where the target sits on the flange: ...".to_owned()];
+    let text = terminal::document(&view::summary(&found), 400);
+    assert!(text.contains("frames alone; errors are those of the target"), "{text}");
 }
 
 #[test]

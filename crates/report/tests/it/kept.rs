@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use serde_json::json;
 use truegrind_arm::region::Outside;
 use truegrind_compensation::deviation::{
-    After, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
+    After, BetweenTargets, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
 };
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
@@ -83,6 +83,20 @@ prop_compose! {
     }
 }
 
+fn between() -> impl Strategy<Value = BetweenTargets> {
+    let lines = || prop::option::of(Just("lines 3, 7".to_owned()));
+    (number(), prop::option::of(number()), (0..9_usize, lines()), (0..9_usize, lines())).prop_map(
+        |(tolerance_mm, largest_mm, (beyond, beyond_lines), (unchecked, unchecked_lines))| BetweenTargets {
+            tolerance_mm,
+            largest_mm,
+            beyond,
+            beyond_lines,
+            unchecked,
+            unchecked_lines,
+        },
+    )
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -92,6 +106,7 @@ proptest! {
         repeated in any::<bool>(),
         held_out_mm in prop::option::of(number()),
         achieved in any::<bool>(),
+        between in prop::option::of(between()),
     ) {
         // Poses of tool and work object that follow each other are stated once.
         if let ([first, rest @ ..], true) = (points.as_mut_slice(), repeated) {
@@ -107,7 +122,7 @@ proptest! {
             reason: Some("out of reach".into()),
         };
         let missing = Some(MissingMotions { motions: vec![left], lines: "line 3".into() });
-        let report = PathReport { program: "a.mod".into(), files: vec!["b.mod".into()], model: "arm".into(), after, points, missing, differences: vec!["line 3: MoveJ".into()], held_out_mm };
+        let report = PathReport { program: "a.mod".into(), files: vec!["b.mod".into()], model: "arm".into(), after, points, missing, differences: vec!["line 3: MoveJ".into()], between, held_out_mm };
         let text = serde_json::to_string(&kept(&report)).unwrap();
         let back = from_kept(&serde_json::from_str(&text).unwrap()).unwrap();
         // Signs of zeros too, which == does not tell.
@@ -133,6 +148,7 @@ proptest! {
             reason: None,
             shape_only: true,
             placed: vec![Placed { name: text.clone(), frame: text.clone(), shape_only: true }],
+            routines: [vec![text.clone()], vec![text.clone(), text.clone()]],
         };
         let back: Row = serde_json::from_str(&serde_json::to_string(&row).unwrap()).unwrap();
         prop_assert_eq!(format!("{row:?}"), format!("{back:?}"));
@@ -174,4 +190,25 @@ fn programs_of_one_work_object_that_are_placed_differently_are_told() {
     assert!(!told(&[moved.clone(), row("parts/p4.mod", "wA", "here", false)]));
     assert!(!told(&[moved.clone(), row("parts/p4.mod", "wB", "here", true)]));
     assert!(!told(&[moved, row("parts/p4.mod", "wA", "elsewhere", true)]));
+}
+
+/// A routine under the displacement of a caller in another program of the run was corrected as if there were none.
+#[test]
+fn a_program_that_another_of_the_run_calls_may_not_run_unchecked() {
+    let row = |file: &str, declares: &[&str], calls: &[&str]| Row {
+        motions: [8, 8, 0, 0, 0],
+        routines: [declares, calls].map(|names| names.iter().map(|name| (*name).to_owned()).collect()),
+        ..Row::without(file.to_owned(), Ended::Changed, None)
+    };
+    let mut rows =
+        vec![row("in/face.mod", &["facep"], &[]), row("in/mainm.mod", &["main"], &["facep", "grip"])];
+    assert!(batch::doubt_called(&mut rows));
+    let text = truegrind_report::format::terminal::document(&batch::summary(&rows), 300);
+    assert!(
+        text.contains("mainm.mod calls facep") && text.contains("1 of 2 is corrected and may run"),
+        "{text}"
+    );
+    let mut apart =
+        vec![row("in/face.mod", &["facep"], &["facep"]), row("in/mainm.mod", &["main"], &["grip"])];
+    assert!(!batch::doubt_called(&mut apart));
 }

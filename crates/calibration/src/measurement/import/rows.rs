@@ -108,6 +108,7 @@ pub(super) fn dataset(
         rows: rows.into(),
         other_columns: columns.other.iter().map(|(name, _)| name.clone()).collect(),
         notes,
+        station_names: stations.names(),
         angle_step_rad,
         readout_step_mm,
         reading_step_mm,
@@ -123,6 +124,12 @@ impl Stations {
         let Some(name) = cell.filter(|cell| !cell.is_empty()).map(Cell::to_string) else { return 0 };
         let next = self.0.len();
         *self.0.entry(name).or_insert(next)
+    }
+
+    fn names(self) -> Vec<String> {
+        let mut named: Vec<(usize, String)> = self.0.into_iter().map(|(name, index)| (index, name)).collect();
+        named.sort_unstable();
+        named.into_iter().map(|(_, name)| name).collect()
     }
 }
 

@@ -97,6 +97,7 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
         sensor,
         rows,
         notes: Vec::new(),
+        station_names: Vec::new(),
         angle_step_rad: None,
         readout_step_mm: None,
         reading_step_mm: None,

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use truegrind_arm::model::Model;
 use truegrind_arm::robots;
+use truegrind_calibration::acceptance::{Options as AcceptOptions, accept};
 use truegrind_calibration::diagnosis::diagnose::{Options as DiagnoseOptions, diagnose};
 use truegrind_calibration::diagnosis::finding::Confidence;
 use truegrind_calibration::identification::identify::{Identification, Options, identify};
@@ -65,6 +66,77 @@ fn moved(mut rows: Dataset) -> Dataset {
     rows
 }
 
+/// The same from so many places in turn, wherever they are.
+fn moved_often(mut rows: Dataset, stations: usize) -> Dataset {
+    let count = rows.rows.len();
+    for (index, row) in rows.rows.iter_mut().enumerate() {
+        row.anchor = index * stations / count;
+        let k = row.anchor as f64;
+        let turn = UnitQuaternion::from_euler_angles(0.01 * k, -0.02 * k, 0.7 * k);
+        let place = Pose::from_parts(Vector3::new(300.0 * k, -200.0 * k, 10.0 * k).into(), turn);
+        match &mut row.reading {
+            Reading::Position(at) => *at = (place * Point3::from(*at)).coords,
+            _ => unreachable!(),
+        }
+    }
+    rows
+}
+
+/// What a frame that four poses place makes of a fifth was told as the arm's error, a hundred times as large.
+#[test]
+fn a_station_of_few_poses_neither_makes_nor_hides_an_error() {
+    let (all, _) = measured("position", 280);
+    let part = |from: usize, to: usize| all.subset(&(from..to).collect::<Vec<_>>());
+    let [fitted, mut further] = [part(0, 160), part(160, 280)];
+    further.sha256.clear();
+    let held_out = |rows: Dataset| identified(&matched(rows)).estimated.geometry.held_out.rmse;
+    let one = held_out(fitted.clone());
+    for stations in [8, 20, 30] {
+        let several = held_out(moved_often(fitted.clone(), stations));
+        assert!((0.6..1.6).contains(&(several / one)), "{stations} stations: {several} against {one}");
+    }
+    let model = identified(&matched(fitted)).estimated;
+    let options = AcceptOptions {
+        tolerance_mm: 1.0,
+        uncertainty_mm: Some(0.02),
+        tolerance_rad: None,
+        uncertainty_rad: None,
+        frames: None,
+        seed: 0,
+    };
+    let accepted = |rows: Dataset| accept(&matched(rows), &model, &options).unwrap();
+    let one = accepted(further.clone());
+    assert_eq!(one.uncounted, None);
+    for stations in [8, 20, 28] {
+        let several = accepted(moved_often(further.clone(), stations));
+        let ratios = [several.model.rmse / one.model.rmse, several.model.max / one.model.max];
+        assert!(ratios.iter().all(|ratio| (0.6..1.7).contains(ratio)), "{stations} stations: {ratios:?}");
+        let left = several.uncounted.map_or(0, |left| left.rows);
+        assert!(
+            several.errors_mm.len() + left == 120 && left < 60,
+            "{stations} stations: {left} rows left out"
+        );
+    }
+}
+
+#[test]
+fn a_small_station_makes_no_held_out_error_of_a_diagnosis() {
+    let (mut rows, _) = measured("position", 120);
+    rows = moved_often(rows, 24);
+    // One large station and two of five poses.
+    rows.rows.iter_mut().filter(|row| row.anchor < 22).for_each(|row| row.anchor = 0);
+    let (rest, _) = measured("position", 120);
+    for (row, seen) in rows.rows.iter_mut().zip(rest.rows.iter()).filter(|(row, _)| row.anchor == 0) {
+        row.reading = seen.reading.clone();
+    }
+    rows.rows.iter_mut().filter(|row| row.anchor > 0).for_each(|row| row.anchor -= 21);
+    let rows = matched(rows);
+    let frames = starting_frames(&rows, &arm(), &Tolerance::default(), true).unwrap();
+    let found =
+        diagnose(&rows, "abb-irb-120", &arm(), &frames, &DiagnoseOptions::default(), &|_| {}).unwrap();
+    assert!(found.diagnosis.fits.extended.cv_rmse_mm < 0.03, "{}", found.diagnosis.fits.extended.cv_rmse_mm);
+}
+
 fn matched(rows: Dataset) -> Dataset {
     match_to_arm(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap()
 }
@@ -116,13 +188,20 @@ fn a_diagnosis_names_the_cause_and_no_shift_of_the_sensor() {
 }
 
 #[test]
-fn a_station_with_too_few_rows_is_refused_by_number() {
+fn a_station_with_too_few_rows_is_refused_by_name() {
     let (rows, _) = measured("position", 90);
     let mut rows = moved(rows);
     let kept: Vec<usize> = (0..rows.rows.len()).filter(|&i| rows.rows[i].anchor != 1 || i < 32).collect();
     rows = rows.subset(&kept);
-    let refused = match_to_arm(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap_err();
-    assert!(matches!(&refused, Mismatch::Station(why) if (why.station, why.rows) == (2, 2)), "{refused}");
+    let refusal =
+        |rows| match_to_arm(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap_err();
+    let refused = refusal(rows.clone());
+    assert!(matches!(&refused, Mismatch::Station(why) if (&*why.station, why.rows) == ("2", 2)), "{refused}");
+    // As typed, with its rows: an "s1" among "S1".
+    rows.station_names = ["S1", "s1", "S2"].map(str::to_owned).to_vec();
+    let [a, b] = [30, 31].map(|row| rows.rows[row].number);
+    let refused = refusal(rows).to_string();
+    assert!(refused.contains(&format!("station s1 (column station: rows {a} and {b})")), "{refused}");
 }
 
 #[test]
@@ -144,6 +223,7 @@ fn the_column_station_holds_names() {
     let rows = rows.unwrap();
     assert_eq!(rows.rows.iter().map(|row| row.anchor).collect::<Vec<_>>(), [0, 1, 0]);
     assert_eq!((rows.stations(), rows.anchors()), (2, 1));
+    assert_eq!(rows.station_names, ["door", "window"]);
     let refused = read("1,2,3,4,5,6,700,800,900,door\n2,3,4,5,6,7,701,801,901,\n").unwrap_err();
     assert!(refused.to_string().contains("the name of a station in every row, or in none"), "{refused}");
     // Of a cable it is a column like any other.

@@ -435,3 +435,33 @@ fn poses_that_are_set_aside_at_the_end_are_told_however_many_fitted_before() {
     let [aside, all] = tracker.latest_set_aside().expect("the latest poses do not fit");
     assert!(all == 30 && aside > 15, "{aside} of {all}");
 }
+
+/// What the fit of the model in use left open is learned from a healthy arm. That is no change of it, and was not told at all.
+#[test]
+fn what_a_model_left_open_is_told_as_a_gain_and_not_as_a_change() {
+    let open = |theta_deg: f64| {
+        let mut open = model().clone();
+        let at = open.order.iter().position(|parameter| parameter.to_string() == "link3.theta").unwrap();
+        let off = theta_deg.to_radians();
+        open.model.links[2].theta_rad += off;
+        open.covariance[(at, at)] += off * off;
+        open
+    };
+    let dataset = measured(2, None);
+    let gain_of = |in_use: &Estimated| {
+        let mut tracker = Tracker::begin(in_use, "hash", &dataset, &Options::default()).unwrap();
+        assert_eq!(tracker.process_file(&dataset).unwrap(), []);
+        let now = tracker.departure().unwrap();
+        assert!(!now.is_significant, "{now:?}");
+        let text = tracker.state().to_toml().unwrap();
+        let resumed = Tracker::resume(in_use, State::from_toml(&text).unwrap(), "state.toml").unwrap();
+        assert_eq!(resumed.gain(), tracker.gain());
+        (tracker.gain(), now)
+    };
+    let (gain, now) = gain_of(&open(0.03));
+    let gain = gain.unwrap();
+    // Noise of 0.015 mm along each axis.
+    assert!(gain.tracked_mm < 0.04 && gain.in_use_mm > 3.0 * gain.tracked_mm && gain.poses >= 30, "{gain:?}");
+    assert!(now.rms_mm > 3.0 * now.tracked_mm, "{now:?}");
+    assert_eq!(gain_of(model()).0, None);
+}

@@ -6,6 +6,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::super::called::program_of;
 use super::super::expression::Variable;
 use crate::dataflow::{Edge, propagate};
 use crate::motion_set::MotionSet;
@@ -337,15 +338,6 @@ impl<'c> Walk<'c> {
             self.graph.edge(self.jumps, at);
         }
     }
-}
-
-/// The name by which other programs call a file: without folder, extension and the archive's additions (`_N_NAME_SPF`).
-pub(super) fn program_of(file: &str) -> Variable {
-    let name = file.rsplit(['/', '\\']).next().unwrap_or(file).to_ascii_uppercase();
-    let name = name.split('.').next().unwrap_or_default();
-    let name = name.strip_prefix("_N_").unwrap_or(name);
-    let name = name.strip_suffix("_SPF").or_else(|| name.strip_suffix("_MPF")).unwrap_or(name);
-    name.as_bytes().to_vec()
 }
 
 /// What may be last at each node: the points, then what calls name, then the jumps of each program.

@@ -1,12 +1,12 @@
 //! Control flow (jumps, loops, subprogram calls), and assignments to variables.
 
+use super::super::called::program_of;
 use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, Variable, numbered};
 use super::super::modal_group::ModalGroup;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
 use super::arrivals::{Site, is_label, label};
-use super::call_edges::program_of;
 use super::paths::is_jump;
 use super::siemens_names::{AddressEffect, address_effect};
 use super::{Block, FlowPoint, Interpreter, StateEvent};
@@ -385,10 +385,13 @@ impl Interpreter<'_, '_> {
             Some(rest) if !rest.is_empty() && rest.iter().all(|word| word.assigned) => self.branch(),
             Some([]) => self.structure(b"IF", Variable::new(), block),
             None if self.dialect == Dialect::Siemens => self.structure(b"IF", Variable::new(), block),
-            _ => {
+            // Haas: IF […] M99 P10.
+            None if block.m.contains(&99) => {
                 self.branch();
                 self.leads_anywhere();
             }
+            // Some controls execute it, others stop with an alarm.
+            _ => self.list_unknown_word(block, "IF", Reason::UnknownWord),
         }
     }
 
@@ -396,6 +399,10 @@ impl Interpreter<'_, '_> {
     /// state: it is assumed not to, and the call is listed in [`crate::motion::NcFacts::external_calls`].
     pub(super) fn subprogram(&mut self, block: &Block<'_>, name: &str) {
         let callee = self.callee(block);
+        // The words that a macro stands for are executed here, whatever they change.
+        if callee.as_ref().is_some_and(|name| self.scan.macros.contains(name)) {
+            return self.list_unknown_word(block, name, Reason::UnknownWord);
+        }
         let is_own = match &callee {
             Some(name) => is_label(name) || self.scan.programs.contains(name),
             None => true,
@@ -403,9 +410,14 @@ impl Interpreter<'_, '_> {
         if !is_own {
             self.listing.nc.external_calls.push(self.listing.motions.len() as u32);
         }
+        // The call itself moves nothing.
+        let preceding = self.state.preceding.clone();
         self.list_left(block, name, Reason::Subprogram);
+        self.state.preceding = preceding;
         self.call(block, callee.as_ref(), is_own);
-        let (next, may_skip) = (self.listing.motions.len() as u32, block.flags.skippable);
+        // What CALL LBL 1 REP 2 repeats ends here, and control passes on.
+        let (next, may_skip) =
+            (self.listing.motions.len() as u32, block.flags.skippable || self.repeats_label(block));
         self.call_edges.push(FlowPoint::Call { callee, may_skip }, self.file, next, true);
     }
 

@@ -19,6 +19,8 @@ pub(super) struct FileScan {
     pub(super) contours: HashMap<u64, u64>,
     /// Names that the file declares (Siemens).
     pub(super) declared: BTreeSet<Vec<u8>>,
+    /// Names of macros (Siemens, DEFINE): the words that each stands for are not read.
+    pub(super) macros: BTreeSet<Vec<u8>>,
     /// Declared names of an integer type.
     pub(super) integer_variables: BTreeSet<Vec<u8>>,
     /// Programs and subprograms in the file, by their O word.

@@ -259,11 +259,11 @@ impl<'s> Interpreter<'_, 's> {
             b"APPR" | b"DEP" | b"CTP" | b"FLT" | b"FCT" => StartDependency::Tangent,
             _ => return false,
         };
-        let previous = self.state.previous;
+        let preceding = self.state.preceding.clone();
         self.list_left_path(block, &String::from_utf8_lossy(name), dependency);
         if matches!(name, b"RND" | b"CHF") {
             // They round or chamfer the corner of their neighbours; the next block is relative to the corner.
-            self.state.previous = previous;
+            self.state.preceding = preceding;
         } else {
             self.invalidate_position();
         }

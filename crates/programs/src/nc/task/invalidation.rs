@@ -4,7 +4,7 @@ use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, literal};
 use super::super::modal_group::{GroupTable, ModalGroup};
 use super::super::modal_state::{AssignedKinds, MotionMode};
-use super::super::syntax::WordValue;
+use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
 use super::siemens_names::code_name;
 use super::{Block, FlowPoint, Interpreter, START_TOOL, StateEvent, start_offset};
@@ -104,15 +104,19 @@ impl Interpreter<'_, '_> {
         self.events.push(StateEvent::PositionUsed { axes, read: false });
     }
 
-    /// Records blocks whose expressions read the tool position.
+    /// Records blocks whose expressions or conditions read the tool position: at a corrected end it would be another one.
     pub(super) fn mark_position_reads(&mut self, block: &Block<'_>) {
+        let reads_in = |first: u32, end: u32| (first..end).any(|token| self.is_position_variable(token, end));
         let reads = block.words.iter().any(|word| match word.value {
             WordValue::Expression { first, end } | WordValue::Arguments { first, end } => {
-                (first..end).any(|token| self.is_position_variable(token, end))
+                reads_in(first, end)
             }
             _ => false,
         });
-        if reads {
+        // The brackets of IF and WHILE belong to no word.
+        let is_control = |word: &Word<'_>| word.name.len() > 1 || word.address() == Some(b'O');
+        let node = || self.tree.nodes.get(block.node);
+        if reads || block.words.iter().take(3).any(is_control) && reads_in(node().first, node().end) {
             self.events.push(StateEvent::PositionUsed { axes: super::EVERYWHERE, read: true });
         }
     }

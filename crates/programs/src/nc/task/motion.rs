@@ -9,6 +9,7 @@ use super::super::dialect::Dialect;
 use super::super::expression::Evaluated;
 use super::super::modal_group::{ARC_GROUPS, MOTION_GROUPS, ModalGroup, TOOL_GROUPS};
 use super::super::modal_state::{MotionMode, OrientationMode, all_known};
+use super::super::preceding::Preceding;
 use super::super::syntax::{Word, WordValue};
 use super::turn::{Turn, turn_between};
 use super::{Block, BlockArc, BlockContext, FlowPoint, Interpreter, StartDependency, StateEvent};
@@ -35,13 +36,21 @@ impl Interpreter<'_, '_> {
         Motion {
             rapid: kind == MotionKind::Joint,
             conditional: block.flags.skippable,
-            previous: self.state.previous,
+            previous: self.state.preceding.single(),
             ..Motion::new(place, statement, self.instruction(name), kind, modal)
         }
     }
 
-    fn push(&mut self, motion: Motion, context: BlockContext) -> u32 {
+    fn push(&mut self, mut motion: Motion, context: BlockContext) -> u32 {
         let index = self.listing.motions.len() as u32;
+        if motion.kind != MotionKind::Unknown
+            && let Some(preceding) = self.state.preceding.of_paths()
+        {
+            match *preceding {
+                [before] if before < index => motion.previous = Some(before),
+                _ => drop(self.listing.predecessors.insert(index, preceding.to_vec())),
+            }
+        }
         self.listing.motions.push(motion);
         self.contexts.push(context);
         self.events.push(StateEvent::Motion(index));
@@ -58,7 +67,7 @@ impl Interpreter<'_, '_> {
         motion.own_reason = Some(reason);
         let context = self.block_context(block, None);
         self.push(motion, context);
-        self.state.previous = None;
+        self.state.preceding = Preceding::default();
         if block.spin.is_some() {
             // The spin stays unknown even if later words state the rest of the orientation.
             self.state.orientation.spin = Err(Reason::OrientationUnknown);
@@ -206,6 +215,10 @@ impl Interpreter<'_, '_> {
             _ => None,
         };
         if let Some(reason) = unknown {
+            if reason == Reason::UnknownFlow {
+                let to = self.end_position(block, &self.state.position);
+                self.note_unstated(block, mode, &to);
+            }
             self.list_left(block, "?", reason);
             self.invalidate_pose();
             return;
@@ -248,8 +261,11 @@ impl Interpreter<'_, '_> {
             start_dependency: self.start_dependency_of(block, mode),
             ..before.joined_with(&after)
         };
+        if motion.reason() == Some(Reason::UnknownFlow) {
+            self.note_unstated(block, mode, &to);
+        }
         let index = self.push(motion, context);
-        self.state.previous = Some(index);
+        self.state.preceding = Preceding::after(index);
         self.state.position = to;
         self.update_after_motion(block, mode, machine);
         // A tool vector holds only in its own LN; later blocks have no word that states the orientation.
@@ -306,7 +322,7 @@ impl Interpreter<'_, '_> {
     fn update_after_motion(&mut self, block: &Block<'_>, mode: MotionMode, machine: bool) {
         if let MotionMode::Unsupported(_) = mode {
             // A spline ends at its last point, whatever its path.
-            self.state.previous = None;
+            self.state.preceding = Preceding::default();
         }
         let call = self.modal_call(block);
         if call == Some(Reason::Subprogram) || call == Some(Reason::Cycle) && self.cycle_is_program {
@@ -338,7 +354,7 @@ impl Interpreter<'_, '_> {
         } else if block.unmodelled == Some(Reason::AlignedToNormal) {
             // The orientation at the end of this block is unknown.
             self.state.invalidate_orientation();
-            self.state.previous = None;
+            self.state.preceding = Preceding::default();
             self.events.push(StateEvent::AxesUnknown(super::ORIENTATION));
         } else if block.unmodelled.is_some() {
             // Omitted axes keep the corrected position of the motion before.
@@ -578,6 +594,8 @@ impl Interpreter<'_, '_> {
             Some(reason)
         } else if state.groups.active_transforms() != 0 {
             Some(Reason::Transformed)
+        } else if mode != MotionMode::Rapid && state.groups.is_on(ModalGroup::PointToPoint) {
+            Some(Reason::UnsupportedPath)
         } else if state.groups.is_on(ModalGroup::ReferencePoint) {
             Some(Reason::ReferencePoint)
         } else if block.flags.other_axes && self.has_incremental_uvw() {

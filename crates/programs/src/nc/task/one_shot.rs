@@ -2,6 +2,7 @@
 
 use super::super::dialect::Dialect;
 use super::super::modal_state::MotionMode;
+use super::super::preceding::Preceding;
 use super::g_codes::{Action, action};
 use super::siemens_names::code_name;
 use super::{Block, Interpreter, StateEvent};
@@ -110,7 +111,7 @@ impl Interpreter<'_, '_> {
                 unknown |= 8 << axis;
             }
         }
-        self.state.previous = None;
+        self.state.preceding = Preceding::default();
         self.events.push(StateEvent::AxesUnknown(unknown));
     }
 }

@@ -256,8 +256,7 @@ impl Interpreter<'_, '_> {
 
     fn call_own(&mut self, block: &Block<'_>, name: &Variable) {
         let entry = if is_label(name) { Site::Label(name.clone()) } else { Site::Program(name.clone()) };
-        let text = block.words.first().map(|word| self.word_text(word)).unwrap_or_default();
-        let is_repeated = text.windows(4).any(|part| part == b" REP");
+        let is_repeated = self.repeats_label(block);
         let is_label = is_label(name);
         let passed = (is_repeated && !self.pass.unreached).then(|| at_join(&self.state));
         if is_label && is_repeated {
@@ -271,6 +270,15 @@ impl Interpreter<'_, '_> {
         if self.may_call_again(block) {
             self.depart(entry);
         }
+    }
+
+    /// Whether a block repeats the blocks behind a label (CALL LBL 1 REP 2).
+    pub(super) fn repeats_label(&self, block: &Block<'_>) -> bool {
+        self.dialect == Dialect::Heidenhain
+            && block
+                .words
+                .first()
+                .is_some_and(|word| self.word_text(word).windows(4).any(|part| part == b" REP"))
     }
 
     /// The state behind a call whose end no pass has reached yet.

@@ -64,6 +64,9 @@ impl Interpreter<'_, '_> {
                 _ => self.tree.source()[self.tree.range(word.first, word.end)].to_ascii_uppercase(),
             });
         }
+        if std::mem::replace(&mut block.defines, word.is("DEFINE")) {
+            self.scan.macros.insert(word.name.to_ascii_uppercase());
+        }
         if std::mem::take(jump) {
             // GOTO N100: the block number is a separate word.
             match (address, number) {
@@ -193,6 +196,8 @@ struct BlockSummary {
     cycle: bool,
     /// DEF.
     declares: bool,
+    /// The word before was DEFINE.
+    defines: bool,
     /// INT, BOOL or CHAR.
     integer_type: bool,
     /// Block skip.

@@ -106,6 +106,9 @@ impl Interpreter<'_, '_> {
                 self.set_group(ModalGroup::SpinReference, 1);
                 self.state.orientation.spin = Err(Reason::OrientationUnknown);
             }
+            // PTPG0 concerns G0 alone, whose path is not ours.
+            b"PTP" | b"CP" => self.set_group(ModalGroup::PointToPoint, u64::from(name == b"PTP")),
+            b"PTPG0" => self.set_group(ModalGroup::PointToPoint, 0),
             b"ORIPATH" | b"ORIPATHS" | b"ORIRESET" => self.state.invalidate_orientation(),
             b"CIP" | b"CT" | b"BSPLINE" | b"ASPLINE" | b"CSPLINE" | b"POLY" | b"INVCW" | b"INVCCW" => {
                 self.state.mode = MotionMode::Unsupported(Reason::UnsupportedPath);

@@ -46,13 +46,15 @@ pub struct SideEffects {
     pub impure: bool,
     /// Whether it counts a displacement from the robot's current position (PDispOn without \ExeP).
     pub uses_position: bool,
+    /// Whether it decides by the robot's current position (CRobT in a condition).
+    pub decides_by_position: bool,
     /// The switches that it sets at some time, not at its end alone.
     pub switches: SwitchSet,
 }
 
 impl SideEffects {
-    /// How many times they can grow: the writes, "anything", five flags, the switches.
-    pub(super) const HEIGHT: usize = MAX_WRITES + 6 + SwitchSet::HEIGHT;
+    /// How many times they can grow: the writes, "anything", seven flags, the switches.
+    pub(super) const HEIGHT: usize = MAX_WRITES + 8 + SwitchSet::HEIGHT;
 
     /// Sorts the writes and widens too many of them to "anything".
     pub(super) fn normalise(&mut self) {
@@ -73,6 +75,7 @@ impl Lattice for SideEffects {
         self.grips |= callee.grips;
         self.impure |= callee.impure;
         self.uses_position |= callee.uses_position;
+        self.decides_by_position |= callee.decides_by_position;
         self.switches = self.switches.join(callee.switches);
         self.writes.extend_from_slice(&callee.writes);
         self.normalise();

@@ -112,6 +112,7 @@ impl Symbols {
                 Syntax::While => facts.effects.waits = true,
                 _ => {}
             }
+            facts.effects.decides_by_position |= self.position_decisions.contains(&(unit.file, node));
             facts.effects.impure |= self.is_node_impure(tree, unit.scope, node);
             node += 1;
         }

@@ -3,7 +3,7 @@
 use super::ListingBuilder;
 use crate::dataflow::{Edge, propagate};
 use crate::motion::load::{Grip, Loads};
-use crate::motion::{Motion, MotionKind, Reason, Switch as SwitchState};
+use crate::motion::{Motion, MotionKind, Place, Reason, Switch as SwitchState};
 use crate::rapid::flow::CallSite;
 use crate::rapid::modal::{Switch, SwitchSet};
 use crate::rapid::payload::Gripped;
@@ -11,19 +11,33 @@ use crate::rapid::payload::Gripped;
 impl ListingBuilder<'_, '_> {
     /// Refuses all motions where a displacement may be counted from the end of any of them.
     pub(super) fn refuse_motions_before_displacement(&mut self) {
-        let units = &self.symbols.units;
-        let begins_anywhere = |unit: &u32| {
-            let Some(routine) = units[*unit as usize].routine else { return true };
-            let called = |(from, site): &(u32, CallSite)| site.routine == routine && from != unit;
-            self.mains.contains(&routine)
-                || self.symbols.interrupts[routine as usize]
-                || !self.sites.iter().any(called)
-        };
-        if self.position_used || self.position_used_at_entry.iter().any(begins_anywhere) {
+        let used_at_entry = self.position_used_at_entry.iter().any(|unit| self.begins_anywhere(*unit));
+        if self.position_used || used_at_entry {
             for motion in &mut self.listing.motions {
                 motion.own_reason.get_or_insert(Reason::BeforeDisplacement);
             }
         }
+    }
+
+    /// Lists decisions by the robot's position that some motion may reach which keeps no endpoint for them: refusing every motion of a
+    /// program that looks where it stands at its start would leave most programs, whose tolerances there are centimetres.
+    pub(super) fn list_position_decisions(&mut self) {
+        let decisions = std::mem::take(&mut self.position_decisions);
+        let open =
+            decisions.into_iter().filter(|(unit, at_entry, _)| !at_entry || self.begins_anywhere(*unit));
+        let mut places: Vec<Place> = open.map(|(.., place)| place).collect();
+        places.sort_unstable_by_key(|place| (place.file, place.line, place.column));
+        places.dedup();
+        self.listing.position_decisions = places;
+    }
+
+    /// Whether a unit may begin where the robot stands after any motion.
+    fn begins_anywhere(&self, unit: u32) -> bool {
+        let Some(routine) = self.symbols.units[unit as usize].routine else { return true };
+        let called = |(from, site): &(u32, CallSite)| site.routine == routine && *from != unit;
+        self.mains.contains(&routine)
+            || self.symbols.interrupts[routine as usize]
+            || !self.sites.iter().any(called)
     }
 
     /// Replaces "as at the entry" by the entry switches.

@@ -606,3 +606,16 @@ fn points_of_the_tool_other_than_its_tip_are_not_corrected() {
     let reset = format!("{}\nFUNCTION RESET TCPM\nM128\n{l}", tcpm(" REFPNT TIP-CENTER"));
     check(Heidenhain, &[(&reset, &[point, point, None])]);
 }
+
+#[test]
+fn a_line_under_ptp_is_no_line() {
+    check(
+        Siemens,
+        &[
+            (&format!("PTP\n{S}\nCP\n{S}"), &[left(UnsupportedPath), None]),
+            (&format!("PTP {S}\n{S}"), &[left(UnsupportedPath), left(UnsupportedPath)]),
+            // It concerns G0, whose path is not ours.
+            (&format!("PTPG0\n{S}"), &[None]),
+        ],
+    );
+}

@@ -2,6 +2,7 @@
 
 use truegrind_programs::motion::Reason::{self, *};
 use truegrind_programs::nc::Task;
+use truegrind_programs::nc::called::called_programs;
 use truegrind_programs::nc::dialect::Dialect::{self, *};
 use truegrind_programs::nc::setup::Setup;
 
@@ -212,4 +213,78 @@ fn many_levels_of_calls_end() {
     }
     source += &format!("LBL 60\n{H}\nLBL 0\n");
     assert!(marked(Heidenhain, &source).iter().all(Option::is_none));
+}
+
+/// The motions before each marked one: that before it in the text, or those where paths have met.
+fn starts(dialect: Dialect, body: &str) -> Vec<Vec<u32>> {
+    let source = format!("{HEAD}{}{body}\n", begin(dialect));
+    let setup = Setup { dialect: Some(dialect), ..Setup::default() };
+    let task = Task::read(&[("x", source.as_bytes())], &setup);
+    let lines: Vec<&str> = source.lines().collect();
+    let motions = task.listing.motions.iter().enumerate();
+    motions
+        .filter(|(_, motion)| lines[motion.place.line as usize - 1].contains('?'))
+        .map(|(index, motion)| match motion.previous {
+            Some(previous) => vec![previous],
+            None => task.listing.predecessors.get(&(index as u32)).cloned().unwrap_or_default(),
+        })
+        .collect()
+}
+
+/// A line behind a branch begins where the motions before it end, so that its path can be checked.
+#[test]
+fn a_motion_knows_where_it_may_begin() {
+    // The first motion has index 0.
+    assert_eq!(starts(LinuxCnc, &format!("o1 if [#1 EQ 1]\nM8\no1 endif\n{G}")), [[0]]);
+    assert_eq!(starts(LinuxCnc, &format!("o1 if [#1 EQ 1]\nG1 X9\no1 endif\n{G}")), [vec![0, 1]]);
+    assert_eq!(starts(Siemens, &format!("M_1:\n{S}")), [[0]]);
+    assert_eq!(starts(Siemens, &format!("M_1:\n{S}\nG1 X7\nIF R1==1 GOTOB M_1")), [vec![0, 2]]);
+    assert_eq!(starts(Fanuc, &format!("IF [#1 EQ 1] GOTO 10\nG1 X9.\nN10 {G}")), [vec![0, 1]]);
+    // Behind a call, and in what is called.
+    let called = format!("CALL LBL 1\n{H}\nM30\nLBL 1\n{H}\nLBL 0");
+    assert_eq!(starts(Heidenhain, &called), [[3], [0]]);
+    // A motion to a place that the text does not tell, and a program in another file.
+    assert_eq!(starts(LinuxCnc, &format!("G28 X0\no1 if [#1 EQ 1]\nM8\no1 endif\n{G}")), [[0_u32; 0]]);
+    assert_eq!(starts(Fanuc, &format!("M98 P7000\n{G}")), [[0_u32; 0]]);
+}
+
+/// CALL LBL 1 REP 2 in the middle of a feed path is no stop: what stands before and behind it is one cut.
+#[test]
+fn a_path_goes_on_behind_a_repetition() {
+    let body = format!("LBL 1\n{H}\nL X+9\nCALL LBL 1 REP 2\n{H}");
+    let source = format!("{HEAD}{}{body}\n", begin(Heidenhain));
+    let task =
+        Task::read(&[("x", source.as_bytes())], &Setup { dialect: Some(Heidenhain), ..Setup::default() });
+    let across = &task.listing.across_calls;
+    assert!(across.contains(&[2, 4]) && across.contains(&[2, 1]), "{across:?}");
+}
+
+/// Some controls of that kind execute what stands behind a condition.
+#[test]
+fn words_behind_a_condition_may_do_anything() {
+    for words in ["THEN G55", "THEN G91", "G55", "THEN G1 Z5."] {
+        check(Fanuc, &format!("IF [#1 EQ 1] {words}\n{G}"), &[Some(UnknownWord)]);
+    }
+    check(Fanuc, &format!("IF [#1 EQ 1] THEN #2=3\n{G}"), &[None]);
+}
+
+/// Every program of Heidenhain begins alike: that another calls it shows there alone.
+#[test]
+fn a_program_that_another_calls_begins_in_the_state_of_the_caller() {
+    let caller =
+        b"1 CYCL DEF 7.1 Z+100\n2 CALL PGM TNC:\\parts\\Sub.h ; CALL PGM NONE\n3 CYCL DEF 12.1 PGM two.h\n";
+    assert_eq!(called_programs(caller), ["SUB", "TWO"]);
+    assert_eq!(
+        called_programs(b"EXTCALL \"/_N_SPF_DIR/_N_ONE_SPF\"\nN10 CALL \"two.mpf\"\nCALLS=1\n"),
+        ["ONE", "TWO"]
+    );
+    let source = format!("{HEAD}{}{H}\n", begin(Heidenhain));
+    let read = |called: &[&str]| {
+        let called = called.iter().map(|name| (*name).to_owned()).collect();
+        let setup = Setup { dialect: Some(Heidenhain), called, ..Setup::default() };
+        let task = Task::read(&[("sub.h", source.as_bytes())], &setup);
+        task.listing.motions.iter().map(|motion| motion.reason()).collect::<Vec<_>>()
+    };
+    assert_eq!(read(&["TWO"]), [None, None]);
+    assert!(read(&["SUB"]).iter().all(Option::is_some));
 }

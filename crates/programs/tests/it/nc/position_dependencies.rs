@@ -44,10 +44,15 @@ fn unmodified_increments_and_position_reads_pin_the_motion_that_ends_there() {
         "#103=0\nWHILE [#103 LT 2] DO1\nG91 G1 X20.\n#103=#103+1\nEND1",
         "#1=#5041\nG1 X#1",
         "G1 X[#5041+5.]",
+        // Behind the correction the other branch would run.
+        "IF[#5041 GT 0.8]GOTO 10\nG1 X5.\nN10",
+        "WHILE [#5041 LT 0.8] DO1\nG91 G0 X20.\nEND1",
     ] {
         assert_eq!(first(Fanuc, body), refused, "{body}");
     }
     assert_eq!(first(Siemens, "R1=$AA_IM[X]\nG1 X=R1"), refused);
+    assert_eq!(first(Siemens, "IF $AA_IW[X]>0.8 GOTOF M_1\nG1 X5\nM_1:"), refused);
+    assert_eq!(first(LinuxCnc, "o1 if [#5420 LT 0.8]\nG1 X5\no1 endif"), refused);
 }
 
 /// G98, the state at power-on, leads back to the level before the cycle.

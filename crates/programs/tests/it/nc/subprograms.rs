@@ -67,6 +67,45 @@ fn calls_of_programs_outside_the_file_are_listed() {
     assert_eq!(outside("a.h", &klartext.replace("5 CYCL CALL", "5 L X+5 M99")), [3, 6]);
 }
 
+/// The words of a macro are executed where its name stands: it is no program that may be assumed to change nothing.
+#[test]
+fn a_macro_is_no_program_outside_the_file() {
+    let go = "G1 X1 Y2 Z3 A=180 B=0 C=0 F600";
+    for macro_ in ["DEFINE UP AS TRANS Z50", "N5 define Up as G91 G1 X5"] {
+        let body = format!("{HEAD}{macro_}\nTRAORI\nT1 D1\nG54\n{go}\nUP\n{go}\nM30\n");
+        let task = Task::read(&[("a.mpf", body.as_bytes())], &Setup::default());
+        assert!(task.listing.nc.external_calls.is_empty(), "{macro_}");
+        let found: Vec<Option<Reason>> = task.listing.motions.iter().map(|motion| motion.reason()).collect();
+        assert_eq!(found, [None, Some(Reason::UnknownWord), Some(Reason::UnknownWord)], "{macro_}");
+    }
+}
+
+/// What a block lacks behind ENDIF, a label or a loop is told word by word.
+#[test]
+fn the_words_that_are_missing_behind_a_label_are_named() {
+    let head = "TRAORI\nT1 D1\nG90 G71 G54\nG1 X1 Y2 Z3 A=180 B=0 C=0 F600\n";
+    let lacks = |between: &str, block: &str| -> Option<String> {
+        let text = format!("{HEAD}{head}{between}\n{block}\nM30\n");
+        let listing = Task::read(&[("a.mpf", text.as_bytes())], &Setup::default()).listing;
+        let last = listing.motions.len() as u32 - 1;
+        assert_eq!(
+            listing.motions[last as usize].reason() == Some(Reason::UnknownFlow),
+            listing.nc.unstated.contains_key(&last)
+        );
+        listing.nc.unstated.get(&last).cloned()
+    };
+    let branch = |block: &str| format!("IF R1==1\n{block}\nENDIF");
+    let whole = "G1 X4 Y5 Z6 A=180 B=0 C=0";
+    assert_eq!(lacks(&branch("G1 X9 A=170"), whole), None);
+    assert_eq!(lacks(&branch("G1 A=170"), "G1 X4 Y5 Z6").as_deref(), Some("A, B, C"));
+    assert_eq!(lacks(&branch("G1 X9 Z8"), "G1 Y5 A=180 B=0 C=0").as_deref(), Some("X, Z"));
+    assert_eq!(lacks(&branch("G91"), whole).as_deref(), Some("G90"));
+    assert_eq!(lacks(&branch("G55"), whole).as_deref(), Some("the work offset (G54)"));
+    assert_eq!(lacks(&branch("G0 X9"), "X4 Y5 Z6 A=180 B=0 C=0").as_deref(), Some("a motion word (G0, G1)"));
+    let label = lacks("AGAIN:\nG1 X5\nG91\nIF R1==1 GOTOB AGAIN", whole).unwrap_or_default();
+    assert!(label.contains("G90") || label.is_empty(), "{label}");
+}
+
 /// Motions that may follow each other across calls, returns, jumps and loops, as pairs of lines.
 #[test]
 fn motions_follow_each_other_across_calls() {
