@@ -6,6 +6,7 @@ pub mod tolerance;
 pub(crate) mod unseen_target;
 pub mod prior_width;
 pub mod rounding;
+pub(crate) mod rounded_log;
 pub mod identifiability;
 pub mod network;
 pub mod solver;

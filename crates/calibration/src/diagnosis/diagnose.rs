@@ -104,8 +104,12 @@ pub fn diagnose(
     let all_causes = &search.stages[2];
     let all_causes = StageErrors { fitted: all_causes.fitted, held_out: all_causes.random };
     let parameters = extended.parameters.len();
-    let beyond = BeyondNoise::of(&all_causes, parameters, dataset.sensor, summary.repeats.as_ref())
+    let mut beyond = BeyondNoise::of(&all_causes, parameters, dataset.sensor, summary.repeats.as_ref())
         .less_rounding(summary.noise_floor.0, dataset.sensor);
+    if let Some(rounded) = &summary.rounded_log {
+        beyond = beyond.beside_rounded_log(rounded, summary.repeats.as_ref(), dataset.sensor);
+    }
+    let (is_log_rounded, repeats) = (summary.rounded_log.is_some(), summary.repeats);
     let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;
     let handover = Handover {
@@ -115,6 +119,8 @@ pub fn diagnose(
         scatter,
         noise_floor_mm: diagnosis.noise_floor_mm,
         beyond_noise: beyond,
+        is_log_rounded,
+        repeats,
         few_poses,
     };
     let HandedOver { estimated, benefit } = handover.arm(&certain, &mut diagnosis.notes);

@@ -346,8 +346,22 @@ impl Diagnosis {
         let fits = &self.fits.extended;
         // Of few rows the held-out error is large because the parameters are uncertain, not the readings.
         let error_mm = fits.cv_rmse_mm.min(fits.rmse_mm);
-        let floor_mm = self.noise_floor_mm.filter(|_| self.poses_needed.is_none())?;
+        let floor_mm = self.noise_and_rounding_mm().filter(|_| self.poses_needed.is_none())?;
         too_much_for_noise(error_mm, floor_mm, self.is_noise_measured()).then(|| fits.cv_rmse_mm / floor_mm)
+    }
+
+    /// The noise floor with the rounding of the log beside it, where that is a finding: repeated poses are rounded alike, so that their
+    /// scatter has none of it.
+    pub fn noise_and_rounding_mm(&self) -> Option<f64> {
+        let floor_mm = self.noise_floor_mm?;
+        Some(
+            self.rounding_mm().filter(|_| self.is_noise_measured()).map_or(floor_mm, |mm| mm.hypot(floor_mm)),
+        )
+    }
+
+    /// What a log that rounds the joint angles leaves in the readings (mm RMS), where that is a finding.
+    pub fn rounding_mm(&self) -> Option<f64> {
+        self.findings.iter().find(|finding| finding.effect == CauseKind::AngleRounding)?.worth_mm
     }
 
     /// Whether poses were repeated, so that the noise floor is that of the sensor and not of rounding alone.

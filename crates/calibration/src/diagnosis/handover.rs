@@ -25,6 +25,7 @@ use crate::identification::parameter_table::parameter_table;
 use crate::identification::unseen_target::unseen_target;
 use crate::identification::verdict::{CONVERGED, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::noise_floor::NoiseFloor;
 use crate::measurement::split;
 use nalgebra::DMatrix;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
@@ -45,6 +46,10 @@ pub(super) struct Handover<'a> {
     pub(super) noise_floor_mm: Option<f64>,
     /// What all causes leave beyond the scatter of repeated poses.
     pub(super) beyond_noise: BeyondNoise,
+    /// Whether the log rounds the angles.
+    pub(super) is_log_rounded: bool,
+    /// The scatter of repeated poses, where enough were repeated.
+    pub(super) repeats: Option<NoiseFloor>,
     /// Says that there are too few poses.
     pub(super) few_poses: Option<String>,
 }
@@ -227,7 +232,13 @@ impl Handover<'_> {
             .map(|s| StageErrors { fitted: s.fitted, held_out: s.random });
         let sensor = self.search.context.dataset.sensor;
         let of_arm = self.beyond_noise.of_submodel(&all, &beside_sensor, sensor, true);
-        of_arm.of_submodel(&beside_sensor, &own, sensor, false)
+        let beyond = of_arm.of_submodel(&beside_sensor, &own, sensor, false);
+        // Beside the rounding of a log the difference of two errors is hardly what a cause is worth: the fit itself is asked.
+        let asked = self.search.asked_of_rounding(arm.fitted, self.repeats.as_ref());
+        match asked.if_rounded().filter(|_| self.is_log_rounded) {
+            Some(rounded) => beyond.beside_rounded_log(&rounded, self.repeats.as_ref(), sensor),
+            None => beyond,
+        }
     }
 
     /// Errors of the data sheet, of geometry, and of the written fit.

@@ -14,7 +14,9 @@ use super::residual_tests::{self, Structure};
 use super::selection::{self, Accepted, Selection};
 use super::validation::{StageError, Validation};
 use crate::identification::network::with_network;
+use crate::identification::rounded_log::{Asked, spent};
 use crate::measurement::dataset::Dataset;
+use crate::measurement::noise_floor::NoiseFloor;
 use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 
 /// The rows, the fits' subjects and the options of a search.
@@ -240,6 +242,22 @@ impl<'a> Search<'a> {
             let mut place = 0..;
             self.accepted.retain(|_| !place.next().is_some_and(|k| passing.contains(&k)));
             *confirmed = self.confirm();
+        }
+    }
+
+    /// A fit to all rows, to be asked whether the log rounds; `repeats` is the scatter of repeated poses.
+    pub(super) fn asked_of_rounding<'s>(
+        &'s self,
+        fit: &'s Extended,
+        repeats: Option<&'s NoiseFloor>,
+    ) -> Asked<'s> {
+        Asked {
+            observed: self.context.subject.observed,
+            model: &fit.model,
+            frames: &fit.frames,
+            spent: spent(fit.estimate.covariance.as_ref(), &fit.priors),
+            set_aside: &self.set_aside,
+            repeats,
         }
     }
 

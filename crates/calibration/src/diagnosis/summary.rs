@@ -15,6 +15,7 @@ use super::residual_tests::{self, Structure};
 use super::search::{Confirmed, Search};
 use super::something_else::SomethingElse;
 use super::unexplained::{Unexplained, something_else};
+use crate::identification::rounded_log::{RoundedLog, Rounding};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::{self, NoiseFloor};
 use crate::measurement::split;
@@ -37,6 +38,8 @@ pub(super) struct Summary {
     pub(super) something_else: Option<SomethingElse>,
     /// The joint about which the residual scatters, where that is large.
     pub(super) joint_scatter: Option<JointScatter>,
+    /// What a log that rounds leaves beside all causes.
+    pub(super) rounded_log: Option<RoundedLog>,
 }
 
 /// Summarises a search. `smoothed` is the held-out error without the smooth correction (mm), if there is one; `few_poses`: there are too few to
@@ -76,6 +79,12 @@ pub(super) fn summarise(
     let aside: Vec<usize> = residual_tests::outliers(&search.found).into_iter().map(|(row, _)| row).collect();
     let logged_rad = searched.observed.angles.typical_rad();
     let scatter = JointScatter::of(&confirmed.linear, &search.found.robust_weight, &aside, logged_rad);
+    let rounding = rounding_beside_causes(search, floor.as_ref());
+    let rounding_finding =
+        rounding_finding(context.dataset, prepared, subject, &search.geometric, (stages, few_poses))
+            .filter(|_| rounding != Rounding::Exact);
+    // Of repeated poses the scatter has no rounding.
+    let rounding_mm = rounding_finding.as_ref().filter(|_| floor.is_some()).and_then(|f| f.worth_mm);
     let unexplained = Unexplained {
         dataset: &searched.observed.dataset,
         discrepancy: &outcome.discrepancy,
@@ -83,7 +92,7 @@ pub(super) fn summarise(
         structure,
         after: &stages[2],
         smoothed,
-        floor_mm: noise_floor.0,
+        floor_mm: noise_floor.0.map(|floor_mm| floor_mm.hypot(rounding_mm.unwrap_or(0.0))),
         noise_measured: floor.is_some(),
     };
     let outliers = unexpected_outliers(search);
@@ -93,7 +102,7 @@ pub(super) fn summarise(
     let something_else =
         unexplained_finding.is_some().then(|| something_else(&searched.observed.dataset, confirmed));
     let of_the_record = [
-        rounding_finding(context.dataset, prepared, subject, &search.geometric, (stages, few_poses)),
+        rounding_finding,
         mismatch_finding(context.dataset, prepared, &stages[2]),
         outlier_finding(context.dataset, &outliers, (off, empirical_mm), &stages[2]),
         unexplained_finding,
@@ -110,6 +119,23 @@ pub(super) fn summarise(
         remaining: unexplained.sentence(),
         something_else,
         joint_scatter: unexplained.scatter().cloned(),
+        rounded_log: match rounding {
+            Rounding::Rounded(rounded) => Some(rounded),
+            Rounding::Exact | Rounding::Undecided => None,
+        },
+    }
+}
+
+/// What the residuals say of the rounding of the angles: those of the model with all causes, or of geometry alone where these leave it open.
+/// Causes that were found in the scatter of a rounded log take up a part of it.
+fn rounding_beside_causes(search: &Search<'_>, repeats: Option<&NoiseFloor>) -> Rounding {
+    let asked = search.asked_of_rounding(&search.extended, repeats);
+    let of_geometry = || search.asked_of_rounding(&search.geometric, repeats).rounding();
+    match asked.rounding() {
+        Rounding::Undecided if matches!(of_geometry(), Rounding::Rounded(_)) => {
+            asked.if_rounded().map_or(Rounding::Undecided, Rounding::Rounded)
+        }
+        found => found,
     }
 }
 

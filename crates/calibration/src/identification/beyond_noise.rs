@@ -4,6 +4,7 @@
 use serde::Serialize;
 
 use super::repeats::Repeats;
+use super::rounded_log::RoundedLog;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::noise_floor::NoiseFloor;
 use truegrind_arm::estimated::beyond_noise::ErringArm;
@@ -85,6 +86,24 @@ impl BeyondNoise {
         match (self, rounding_mm) {
             (Self::AtMost(mm), Some(rounding_mm)) => {
                 Self::AtMost((mm.powi(2) - (of_position(sensor) * rounding_mm).powi(2)).max(0.0).sqrt())
+            }
+            _ => self,
+        }
+    }
+
+    /// Beside a log that rounds, which is no error of the arm: what else there is, less the scatter of repeated poses. These are rounded to the
+    /// same angles, so that their scatter has none of the rounding.
+    pub(crate) fn beside_rounded_log(
+        self,
+        rounded: &RoundedLog,
+        repeats: Option<&NoiseFloor>,
+        sensor: Sensor,
+    ) -> Self {
+        let other_mm = of_position(sensor) * rounded.other_mm;
+        match (self, repeats) {
+            (Self::Known(mm), Some(floor)) => {
+                let floor_mm = of_position(sensor) * floor.sigma_mm;
+                Self::Known(mm.min((other_mm.powi(2) - floor_mm.powi(2)).max(0.0).sqrt()))
             }
             _ => self,
         }

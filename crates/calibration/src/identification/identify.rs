@@ -18,6 +18,7 @@ use crate::identification::misreading;
 use crate::identification::parameter_table::parameter_table;
 use crate::identification::prior_width::width_uncertainty;
 use crate::identification::repeats::Repeats;
+use crate::identification::rounded_log::{Asked, Rounding, spent};
 use crate::identification::rounding::{
     AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance, rounding_floor_mm,
 };
@@ -247,9 +248,24 @@ pub fn identify(
     report_step("estimating the benefit for programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
     let sensor = observed.dataset.sensor;
-    let beyond_noise =
+    let mut beyond_noise =
         BeyondNoise::beside(&trained.geometry, geometry.parameters.len(), sensor, repeats.as_ref())
             .less_rounding(estimated.noise_floor_mm, sensor);
+    // Where repeated poses show more than white noise, they say nothing of what else there is beside the rounding.
+    let white = scatter.zip(repeats.as_ref().and_then(Repeats::white_mm));
+    let white = white.map(|(floor, sigma_mm)| NoiseFloor { sigma_mm, ..floor });
+    let asked = Asked {
+        observed: &observed,
+        model: &geometry.model,
+        frames: &geometry.frames,
+        spent: spent(geometry.estimate.covariance.as_ref(), &geometry.priors),
+        set_aside: &[],
+        repeats: white.as_ref(),
+    };
+    let rounding = asked.rounding();
+    if let Rounding::Rounded(rounded) = &rounding {
+        beyond_noise = beyond_noise.beside_rounded_log(rounded, white.as_ref(), sensor);
+    }
     estimated.beyond_noise_mm = beyond_noise.known_mm();
     estimated.beyond_noise_rad = estimated
         .beyond_noise_mm
@@ -270,6 +286,7 @@ pub fn identify(
         unseen_target: unseen_target(&geometry, &observed.dataset, &estimated),
         repeats: repeats.as_ref().and_then(Repeats::pattern),
         longer_tool: longer_tool_of(&estimated, benefit.as_ref()),
+        rounded_log: rounding.note(dataset.angle_step_rad, trained.geometry.held_out.rmse),
     };
     estimated.verdict = judge(&case, options);
     Ok(Identification {
@@ -601,6 +618,8 @@ struct VerdictInputs<'a> {
     repeats: Option<&'a str>,
     /// What errors beyond the noise make of a tool that is longer than the target is far from the flange.
     longer_tool: Option<String>,
+    /// That the log rounds the angles.
+    rounded_log: Option<String>,
 }
 
 /// Share of the expected error from which what is beyond the noise is stated for longer tools.
@@ -666,6 +685,9 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     }
     if let Some(longer_tool) = &case.longer_tool {
         verdict.note(longer_tool.as_str());
+    }
+    if let Some(rounded_log) = &case.rounded_log {
+        verdict.note(rounded_log.as_str());
     }
     if case.outliers.too_many > 0 {
         verdict.note(format!(

@@ -45,6 +45,11 @@ impl AngleCovariance {
         (trace / 6.0).sqrt()
     }
 
+    /// Standard deviation of every angle (rad), where it is one for all joints and rows.
+    pub(crate) fn common_sigma_rad(&self) -> Option<f64> {
+        self.own.is_empty().then(|| (self.common.trace() / 6.0).sqrt())
+    }
+
     /// Gives row `i` a covariance of its own.
     pub fn set(&mut self, i: usize, covariance: Matrix6<f64>) {
         if self.own.is_empty() {

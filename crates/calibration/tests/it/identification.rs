@@ -5,6 +5,7 @@ mod calibration;
 mod prior_width;
 mod promise;
 mod repeats;
+mod rounded_log;
 mod sensor_laws;
 mod stated_frame;
 mod stations;

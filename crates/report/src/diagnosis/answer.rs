@@ -68,11 +68,15 @@ const SHOWN_MM: f64 = 5e-4;
 
 /// What an error that is too large for noise may come from, and what to check.
 fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
-    let (Some(times), Some(floor)) = (diagnosis.times_the_noise(), diagnosis.noise_floor_mm) else {
+    let (Some(times), Some(floor)) = (diagnosis.times_the_noise(), diagnosis.noise_and_rounding_mm()) else {
         return Vec::new();
     };
     let left = if diagnosis.findings.is_empty() { "" } else { " that is left" };
-    let source = if diagnosis.is_noise_measured() { "" } else { ", which is that of rounding alone" };
+    let source = match (diagnosis.is_noise_measured(), diagnosis.rounding_mm()) {
+        (true, None) => "",
+        (true, Some(_)) => " with the rounding of the log",
+        (false, _) => ", which is that of rounding alone",
+    };
     let mut out = vec![
         format!(
             "the held-out error{left} ({:.3} mm) is {times:.0} times the noise floor ({floor:.3} mm{source}), too much for noise: its \
