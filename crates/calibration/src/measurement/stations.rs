@@ -115,8 +115,8 @@ fn placed_by_arm(
 /// arm. With V what n readings of unit variance leave uncertain of a frame at the place of a row, errors are divided by √(1 + tr V/3); where
 /// the frame makes more of an error than three readings would, it shows nothing, and there is none. Rows of one station stay as they are.
 ///
-/// V = I/n + [e]ₓ M⁻¹ [e]ₓᵀ, e the place relative to the mean of the n readings, M their second moments Σ (|d|² I − d dᵀ); measured orientations
-/// leave the first part alone.
+/// V = I/n + S M⁻¹ Sᵀ, S the matrix of the cross product with the place relative to the mean of the n readings, M their second moments
+/// Σ (|d|² I − d dᵀ); measured orientations leave the first part alone.
 pub(crate) fn without_frames(train: &Dataset, test: &Dataset, errors: Vec<f64>) -> Vec<Option<f64>> {
     let stations = train.stations().max(test.stations());
     if stations < 2 {
