@@ -467,14 +467,14 @@ fn a_program_that_is_corrected_again_states_no_before_and_after() {
         |plan: &Plan, listing: &Listing| terminal::document(&view::summary(plan, listing, &files), 400);
     let once = said(&plan, &listing);
     assert!(
-        once.contains("expected after") && once.contains("probability that the corrected cuts"),
+        once.contains("(1σ) of at most") && once.contains("probability that the corrected cuts"),
         "{once}"
     );
     let mark = Mark { version: "0.1.0".to_owned(), model: "abc".to_owned(), partial: false };
     listing.marks = vec![Some(mark), None];
     let again = said(&plan, &listing);
     assert!(again.contains("[warning] Corrected a second time: both corrections add up"), "{again}");
-    assert!(!again.contains("expected after") && !again.contains("probability that"), "{again}");
+    assert!(!again.contains("(1σ) of at most") && !again.contains("probability that"), "{again}");
 }
 
 /// The largest deviation of an uncorrected program is that of the motions with a known one.
