@@ -40,8 +40,8 @@ pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
 
 /// Undeclared frames of a motion, and whether each is a tool.
 fn names<'a>(listing: &'a Listing, motion: &Motion) -> impl Iterator<Item = (bool, &'a str)> {
-    // A cancelled tool length is no tool that could be declared.
-    let is_tool = |name: &str| !(listing.numbered && name == "G49");
+    // A cancelled tool length is no tool that could be declared, nor is one whose number the text does not tell.
+    let is_tool = |name: &str| !(listing.numbered && matches!(name, "G49" | "T?"));
     let tool = listing
         .tool(motion)
         .filter(|tool| is_tool(&tool.name) && nowhere(tool.value.as_ref().err(), tool.place));

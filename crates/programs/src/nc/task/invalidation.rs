@@ -161,7 +161,8 @@ impl Interpreter<'_, '_> {
     /// The start of a subprogram file: every group has the unknown value of the caller.
     pub(super) fn start_subprogram(&mut self) {
         self.state.join_unseen_predecessors(0, AssignedKinds::default());
-        self.state.tool.next = Some("T?".to_owned());
+        // TOOL CALL prepares nothing.
+        self.state.tool.next = (self.dialect != Dialect::Heidenhain).then(|| "T?".to_owned());
         self.events.push(StateEvent::Join);
     }
 

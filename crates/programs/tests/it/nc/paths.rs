@@ -287,4 +287,9 @@ fn a_program_that_another_calls_begins_in_the_state_of_the_caller() {
     };
     assert_eq!(read(&["TWO"]), [None, None]);
     assert!(read(&["SUB"]).iter().all(Option::is_some));
+    // Its own TOOL CALL says which tool that is.
+    let setup = Setup { dialect: Some(Heidenhain), called: ["SUB".to_owned()].into(), ..Setup::default() };
+    let task = Task::read(&[("sub.h", source.as_bytes())], &setup);
+    let tool = task.listing.tool(&task.listing.motions[0]);
+    assert_eq!(tool.map(|tool| tool.name.as_str()), Some("T1"));
 }
