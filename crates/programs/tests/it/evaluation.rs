@@ -493,7 +493,7 @@ fn predefined_names_stand_in_order() {
 /// branch: the end stays where it is. What cannot be laid to single motions is listed.
 #[test]
 fn a_motion_keeps_the_end_by_which_the_program_decides() {
-    let p = "CONST robtarget p:=[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nVAR robtarget c;\nVAR pos o;\n";
+    let p = "CONST robtarget p:=[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nVAR robtarget c;\nVAR pos o;\nVAR num n;\n";
     let go = "MoveL p,v100,fine,tool0;\n";
     let inpos = "FUNC bool inpos(robtarget at)\nVAR robtarget now;\nnow:=CRobT(\\Tool:=tool0);\n\
                  RETURN Distance(now.trans,at.trans)<1;\nENDFUNC\n";
@@ -512,15 +512,18 @@ fn a_motion_keeps_the_end_by_which_the_program_decides() {
         "o:=CPos();\nIF o.x>100 THEN\n",
         "IF inpos(p) THEN\n",
         "IF CRobT()=p THEN\n",
+        "o:=CPos();\nn:=o.x;\nn:=n-100;\nIF n>0 THEN\n",
     ] {
         assert_eq!(decided(&format!("{go}{condition}{go}ENDIF\n")), (vec![kept, None], 0), "{condition}");
     }
     // Before the first motion the robot stands anywhere.
     assert_eq!(decided(&format!("IF inpos(p) RETURN;\n{go}")), (vec![None], 1));
     // A position that is only shown or moved from decides nothing.
-    for harmless in
-        ["c:=CRobT(\\Tool:=tool0);\nTPWrite \"z\" \\Num:=c.trans.z;\n", "TPWrite \"at\" \\Pos:=CPos();\n"]
-    {
+    for harmless in [
+        "c:=CRobT(\\Tool:=tool0);\nc.trans.x:=c.trans.x+5;\n",
+        "c:=CRobT(\\Tool:=tool0);\nTPWrite \"z\" \\Num:=c.trans.z;\n",
+        "TPWrite \"at\" \\Pos:=CPos();\n",
+    ] {
         assert_eq!(decided(&format!("{go}{harmless}{go}")), (vec![None, None], 0), "{harmless}");
     }
 }

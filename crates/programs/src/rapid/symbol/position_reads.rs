@@ -1,7 +1,7 @@
 //! Reads of the robot's position (CRobT, CPos, CJointT) by which a program decides: in a condition, a result, an argument of a routine
 //! of the program, or data that occur in one. At the corrected end of a motion they read another place than the text states.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use crate::rapid::instruction;
 use crate::rapid::predefined;
@@ -19,14 +19,7 @@ pub(super) fn position_decisions(trees: &[RapidTree<'_>]) -> BTreeSet<(u32, u32)
     if found.iter().all(Vec::is_empty) {
         return BTreeSet::new();
     }
-    let mut deciding = HashSet::new();
-    for tree in trees {
-        for node in 0..tree.nodes.len() {
-            for part in deciding_parts(tree, node) {
-                names_in(tree, part, &mut deciding);
-            }
-        }
-    }
+    let deciding = deciding_names(trees);
     let mut out = BTreeSet::new();
     for ((file, tree), found) in (0..).zip(trees).zip(found) {
         let mut add = |node: u32| {
@@ -50,6 +43,32 @@ pub(super) fn position_decisions(trees: &[RapidTree<'_>]) -> BTreeSet<(u32, u32)
         }
     }
     out
+}
+
+/// The names, in lower case, of data by which a program decides, or from which such data are computed.
+fn deciding_names(trees: &[RapidTree<'_>]) -> HashSet<Vec<u8>> {
+    let mut names = HashSet::new();
+    let mut assignments: HashMap<Vec<u8>, Vec<(&RapidTree<'_>, u32)>> = HashMap::new();
+    for tree in trees {
+        for node in 0..tree.nodes.len() {
+            if tree.nodes.kind(node) == Syntax::Assignment {
+                if let Some(name) = assigned(tree, node) {
+                    assignments.entry(folded(name)).or_default().push((tree, node));
+                }
+            } else {
+                deciding_parts(tree, node).into_iter().for_each(|part| names_in(tree, part, &mut names));
+            }
+        }
+    }
+    let mut open: Vec<Vec<u8>> = names.iter().cloned().collect();
+    while let Some(name) = open.pop() {
+        for (tree, node) in assignments.remove(&name).unwrap_or_default() {
+            let mut from = HashSet::new();
+            deciding_parts(tree, node).into_iter().for_each(|part| names_in(tree, part, &mut from));
+            open.extend(from.into_iter().filter(|name| names.insert(name.clone())));
+        }
+    }
+    names
 }
 
 /// Whether a predefined function of this name reads where the robot stands.
