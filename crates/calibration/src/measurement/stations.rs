@@ -21,7 +21,7 @@ const FEWEST: usize = 4;
 /// The rows of a station do not say where it stood.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "{file}: the {rows} rows of station {station} (column station: {}) do not show where it stood: measure at least {FEWEST} poses from each \
+    "{file}: what was measured from station {station} (column station: {}) does not show where it stood: measure at least {FEWEST} poses from each \
      station, not on a line, and write its name alike in all of its rows",
     row_list(.numbers)
 )]
