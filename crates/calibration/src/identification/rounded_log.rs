@@ -6,7 +6,8 @@
 //! cov rᵢ = (s² + c²) 1 + Σⱼ (1 + eⱼ) gⱼ gⱼᵀ,  c², eⱼ ≥ 0,
 //!
 //! eⱼ for what else errs about that joint, c² for what differs from pose to pose but not about a joint; s² is also that of the repetitions of a
-//! pose. If they are exact, the arm's own errors make all of it, cov rᵢ = (s² + c²) 1 + Σⱼ tⱼ gⱼ gⱼᵀ with any tⱼ ≥ 0. That all joints scatter by just h/√12 is an accident then, for which as many parameters as there are visible joints must be right.
+//! pose. If they are exact, the arm's own errors make all of it, cov rᵢ = (s² + c²) 1 + Σⱼ tⱼ gⱼ gⱼᵀ with any tⱼ ≥ 0. That all joints scatter by
+//! just h/√12 is an accident then, for which as many parameters as there are visible joints must be right.
 //! Either model gets those of c², eⱼ and tⱼ that lower its Bayesian information criterion; the difference of the two criteria decides. Arms
 //! whose own errors exceed the rounding about every joint look alike under both, and nothing is decided: it would change little.
 //!
@@ -33,6 +34,17 @@ pub(crate) struct RoundedLog {
     pub(crate) other_mm: f64,
 }
 
+/// What the residuals say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Rounding {
+    /// The log rounds.
+    Rounded(RoundedLog),
+    /// The angles are exact: rounding would scatter the readings more than they do.
+    Exact,
+    /// Neither is clear, or nothing is rounded.
+    Undecided,
+}
+
 /// Least part of the mean square held-out error from which the rounding is told.
 const TOLD_SHARE: f64 = 0.25;
 
@@ -48,17 +60,6 @@ impl Rounding {
             )
         })
     }
-}
-
-/// What the residuals say.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Rounding {
-    /// The log rounds.
-    Rounded(RoundedLog),
-    /// The angles are exact: rounding would scatter the readings more than they do.
-    Exact,
-    /// Neither is clear, or nothing is rounded.
-    Undecided,
 }
 
 /// A fit, of which the residuals are asked.

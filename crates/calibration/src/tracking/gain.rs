@@ -22,6 +22,8 @@ const MOST: usize = 200;
 const SIGNIFICANT: f64 = 3.1;
 /// Steps that place sensor and target under the model in use.
 const STEPS: usize = 4;
+/// Added to the normal equations, as a share of their diagonal.
+const DAMPING: f64 = 1e-9;
 
 /// Errors of the model in use and of the tracked one on poses that neither had used.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,6 +115,3 @@ impl Tracker {
         Some(r.chunks(per).zip(records).map(square).collect())
     }
 }
-
-/// Added to the normal equations, as a share of their diagonal.
-const DAMPING: f64 = 1e-9;
