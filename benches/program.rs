@@ -67,7 +67,7 @@ use truegrind::arm::parameter::{Parameter, link_parameters};
 use truegrind::arm::region::Region;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::options::Options;
-use truegrind::compensation::plan::planner::plan;
+use truegrind::compensation::plan::solved_program::plan;
 use truegrind::math::statistics::ErrorSummary;
 use truegrind::planning::toolpath::toolpath;
 use truegrind::programs::motion::MotionKind;

@@ -1,7 +1,7 @@
 //! The command line: one file per verb. Only this module prints and opens files.
 //!
 //! Results go to stdout, messages and progress to stderr. Exit code 0: done; 1: done, but something was refused or
-//! flagged; 2: error, nothing done.
+//! flagged; 2: error: the result was not written (reports on why a model was refused may be).
 
 mod computation;
 mod exit_status;

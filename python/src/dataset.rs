@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::import::{self, cell::Cell};
-use truegrind::calibration::measurement::matching::match_to_arm;
+use truegrind::calibration::measurement::matching::prepare_rows;
 use truegrind::calibration::measurement::plausibility::implausible_payload;
 use truegrind::{Dataset, ImportOptions, Reading, Robot, Sensor, read_measurements};
 
@@ -328,6 +328,6 @@ impl PyDataset {
         if let Some(suspicion) = rated.and_then(|rated| implausible_payload(&self.rows, rated)) {
             return Err(suspicion.into());
         }
-        Ok(match_to_arm((*self.rows).clone(), name, &robot.model, convention, self.odd_units)?)
+        Ok(prepare_rows((*self.rows).clone(), name, &robot.model, convention, self.odd_units)?)
     }
 }

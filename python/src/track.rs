@@ -116,7 +116,7 @@ pub(crate) fn track_(
         let rows = given.iter().map(|dataset| {
             let odd = allow_odd_units || dataset.odd_units;
             let rows = (*dataset.rows).clone();
-            truegrind::calibration::measurement::matching::match_to_arm(
+            truegrind::calibration::measurement::matching::prepare_rows(
                 rows,
                 &arm.robot,
                 &arm.nominal,

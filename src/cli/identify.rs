@@ -17,7 +17,7 @@ use truegrind::calibration::identification::verdict::{CONVERGED, Limits, NO_LIMI
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import::{self, TimeMatching};
-use truegrind::calibration::measurement::matching::{Mismatch, match_to_arm};
+use truegrind::calibration::measurement::matching::{Mismatch, prepare_rows};
 use truegrind::calibration::measurement::plausibility::implausible_payload;
 use truegrind::calibration::measurement::split::{self, Split};
 use truegrind::report::format;
@@ -372,7 +372,7 @@ fn measured(arguments: &DataArguments, robot: &Robot, dataset: Dataset) -> anyho
         refuse_implausible_payload(&dataset, robot)?;
     }
     let mut dataset =
-        match_to_arm(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
+        prepare_rows(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
             Mismatch::Units(_) | Mismatch::Condition(_) => {
                 anyhow!("{mismatch} (--allow-odd-units accepts the file anyway)")
             }

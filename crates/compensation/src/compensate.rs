@@ -16,9 +16,9 @@ use crate::frames::taught::contradictions;
 use crate::frames::undeclared;
 use crate::options::{Emit, Options};
 use crate::plan::Plan;
-use crate::plan::planner::SolvedProgram;
 use crate::plan::reason::OutcomeReason;
 use crate::plan::single_precision::single_precision;
+use crate::plan::solved_program::SolvedProgram;
 use crate::plan::steps_to_left::StepsToLeft;
 use crate::risk::prepared_estimate::PreparedEstimate;
 use truegrind_arm::effect::Effect;
@@ -88,7 +88,8 @@ pub fn compensate_prepared(
     }
     let partial = options.cuts == Cuts::Partial;
     let mark = mark.map(|mark| Mark { partial, ..mark });
-    let rewrite = RewriteOptions { mark, ..RewriteOptions::default() };
+    let rewrite =
+        RewriteOptions { mark, position_decimals: options.position_decimals, ..RewriteOptions::default() };
     let mut targets = SolvedProgram::of(listing, prepared, cell, options);
     let mut refused: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
     let play =

@@ -6,6 +6,7 @@ pub(crate) mod notes;
 pub mod planner;
 pub mod reason;
 pub mod single_precision;
+pub mod solved_program;
 pub mod steps_to_left;
 mod surface_normals;
 

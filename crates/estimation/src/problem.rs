@@ -59,10 +59,20 @@ pub struct Prior {
 }
 
 impl Prior {
+    /// The share of a parameter that the data determine, given its variance: 1 − variance / σ², between 0 and 1.
+    pub fn determined_share(&self, variance: f64) -> f64 {
+        (1.0 - variance / (self.sigma * self.sigma)).clamp(0.0, 1.0)
+    }
+
     /// 1 / σ², 0 without a prior.
     fn precision(&self) -> f64 {
         1.0 / (self.sigma * self.sigma)
     }
+}
+
+/// Effective number of parameters: each counts by the share that the data determine, not its prior.
+pub fn effective_parameters(variances: impl IntoIterator<Item = f64>, priors: &[Prior]) -> f64 {
+    priors.iter().zip(variances).map(|(prior, variance)| prior.determined_share(variance)).sum()
 }
 
 /// JᵀJ, Jᵀr and ½ rᵀr of a set of rows, priors not included.

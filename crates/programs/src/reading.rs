@@ -39,13 +39,10 @@ impl Language {
     /// assert_eq!(Language::of("blade.txt", b"G90 G1 X10 F500\n"), Language::Nc);
     /// ```
     pub fn of(name: &str, bytes: &[u8]) -> Language {
-        let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
-        if RAPID.contains(&ending.as_str()) {
-            return Language::Rapid;
-        }
-        if NC.contains(&ending.as_str()) {
-            return Language::Nc;
-        }
+        Self::by_name(name).unwrap_or_else(|| Self::by_content(bytes))
+    }
+
+    fn by_content(bytes: &[u8]) -> Language {
         // RAPID ends its statements with `;` and calls its motions by name.
         let sample = &bytes[..bytes.len().min(1 << 16)];
         let upper = sample.to_ascii_uppercase();

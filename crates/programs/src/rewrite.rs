@@ -33,9 +33,10 @@ pub enum NewTarget {
     },
 }
 
-/// Limits of positions (mm) and angles (°) that a control can read.
-const FARTHEST_MM: f64 = 1e7;
-const FARTHEST_DEG: f64 = 1e6;
+/// Limits of positions (mm) and angles (°) that a control can read. A target may be read up to
+/// [`FARTHEST_MM`](crate::motion::FARTHEST_MM), and what is corrected lies beyond it by a tool and a work object.
+const LARGEST_WRITTEN_MM: f64 = 1e7;
+const LARGEST_WRITTEN_DEG: f64 = 1e6;
 
 impl NewTarget {
     /// Whether a control can represent its numbers.
@@ -44,9 +45,11 @@ impl NewTarget {
             NewTarget::Keep | NewTarget::Drop => true,
             NewTarget::Cartesian { position_mm, quaternion, .. } => {
                 let square: f64 = quaternion.iter().map(|q| q * q).sum();
-                position_mm.iter().all(|x| x.abs() <= FARTHEST_MM) && (0.25..=4.0).contains(&square)
+                position_mm.iter().all(|x| x.abs() <= LARGEST_WRITTEN_MM) && (0.25..=4.0).contains(&square)
             }
-            NewTarget::Joint { robot_deg } => robot_deg.iter().all(|angle| angle.abs() <= FARTHEST_DEG),
+            NewTarget::Joint { robot_deg } => {
+                robot_deg.iter().all(|angle| angle.abs() <= LARGEST_WRITTEN_DEG)
+            }
         }
     }
 }

@@ -207,12 +207,12 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
 
     /// The child nodes of a node.
     pub fn child_nodes(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
-        let end = self.nodes.behind(node);
+        let end = self.nodes.subtree_end(node);
         let mut next = node + 1;
         std::iter::from_fn(move || {
             (next < end).then(|| {
                 let this = next;
-                next = self.nodes.behind(this);
+                next = self.nodes.subtree_end(this);
                 this
             })
         })

@@ -131,7 +131,7 @@ fn point_columns((word, key): (&str, &str), decimals: usize, file: bool) -> Vec<
         Column::text("status", "Status"),
         Column::text("reason", "Reason"),
     ]);
-    // Behind those that files of earlier versions have.
+    // After those that files of earlier versions have.
     for (side, key) in [("before", "before"), (word, key)] {
         columns.push(Column::number(format!("{key}_turn_deg"), format!("{side} turn"), "°", 4));
     }

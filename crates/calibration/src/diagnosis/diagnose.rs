@@ -23,6 +23,7 @@ use crate::identification::fit::{
     OUTLIER_SHARE, Observations, WRONG_ORIENTATION_RAD, frame_parameters, median_orientation_error,
 };
 use crate::identification::misreading;
+use crate::identification::misreading::OTHER_ARM_MM;
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Dataset;
@@ -55,9 +56,6 @@ pub struct Diagnosed {
     /// A picture for each finding with a cause in the model, `None` for the others.
     pub pictures: Vec<Option<Picture>>,
 }
-
-/// Median error with only the frames fitted above which the rows are not of this arm (mm).
-const WRONG_ARM_MM: f64 = 25.0;
 
 /// Diagnoses `dataset` of the arm `nominal` (by name `robot`), frames starting at `frames`. `progress` is called at every step.
 ///
@@ -148,14 +146,14 @@ fn refuse_other_arm(
 ) -> Result<(), DiagnoseError> {
     let (file, robot) = (dataset.file.clone(), robot.to_owned());
     let errors = registered.problem.errors_mm(&registered.x);
-    let median_mm = residual_tests::median_error_mm(registered);
-    if !(median_mm < WRONG_ARM_MM) {
+    if !(residual_tests::median_error_mm(registered) < OTHER_ARM_MM) {
+        let rmse_mm = ErrorSummary::of(errors).rmse;
         let explanation = misreading::explanation(dataset, subject.nominal);
-        return Err(DiagnoseError::WrongArm { file, robot, rmse_mm: median_mm, explanation });
+        return Err(DiagnoseError::WrongArm { file, robot, rmse_mm, explanation });
     }
     // Most rows may fit and a good part be of other poses: where that is more than `identify` sets aside, and something explains it, it is no
     // cause to search for.
-    let strange = errors.iter().filter(|error| !(error.abs() < WRONG_ARM_MM)).count();
+    let strange = errors.iter().filter(|error| !(error.abs() < OTHER_ARM_MM)).count();
     if strange as f64 > OUTLIER_SHARE * errors.len() as f64
         && let Some(explanation) = misreading::explanation(dataset, subject.nominal)
     {
@@ -176,8 +174,8 @@ fn refuse_other_rows(search: &Search<'_>, robot: &str) -> Result<(), DiagnoseErr
     let errors = search.extended.problem.errors_mm(&search.extended.x);
     let of_aside = ErrorSummary::of(search.set_aside.iter().map(|&row| errors[row]));
     let left_mm = search.stages[2].fitted.rmse;
-    let is_of_another = too_many_aside(search.set_aside.len(), errors.len()) && of_aside.rmse > WRONG_ARM_MM;
-    if left_mm < WRONG_ARM_MM && !is_of_another {
+    let is_of_another = too_many_aside(search.set_aside.len(), errors.len()) && of_aside.rmse > OTHER_ARM_MM;
+    if left_mm < OTHER_ARM_MM && !is_of_another {
         return Ok(());
     }
     Err(DiagnoseError::WrongArm {

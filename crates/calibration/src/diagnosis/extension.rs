@@ -25,6 +25,7 @@ use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, link_parameters};
 use truegrind_estimation::estimate::{Estimate, Evaluations, Termination};
 use truegrind_estimation::least_squares::lm;
+use truegrind_estimation::problem::effective_parameters;
 use truegrind_estimation::problem::{Prior, Problem, prior_cost};
 use truegrind_math::statistics::median;
 
@@ -307,14 +308,14 @@ impl Round {
         Self::Solved(estimate.covariance)
     }
 
-    /// Effective number of parameters: each counts by the share that its prior does not determine.
+    /// Effective number of parameters.
     fn spent(&self, priors: &[Prior]) -> f64 {
         let variances = match self {
             Self::Step(step) => step.variances(),
             Self::Solved(Some(covariance)) => covariance.diagonal().as_slice().to_vec(),
             Self::Solved(None) => Vec::new(),
         };
-        priors.iter().zip(&variances).map(|(p, v)| (1.0 - v / p.sigma.powi(2)).clamp(0.0, 1.0)).sum()
+        effective_parameters(variances, priors)
     }
 }
 

@@ -16,7 +16,7 @@ use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
 use crate::identification::fit::Fitted;
 use crate::identification::identify::{
-    self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition,
+    self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, median_condition,
     with_sigma_in_region,
 };
 use crate::identification::inflation::inflation_from_errors;
@@ -287,7 +287,7 @@ impl Handover<'_> {
             beyond_noise_rad: None,
             verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
             region: Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0),
-            condition: mean_condition(dataset),
+            condition: median_condition(dataset),
         }
     }
 }
@@ -355,7 +355,7 @@ fn without_measurement_causes(
     let without = written(search, &of_the_arm, correlated);
     let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
     let beside = in_doubt::with_zero_causes(&without, certain.fit.clone());
-    match probability_worse(&certain.fit, &beside, &mean_condition(dataset), &samples) {
+    match probability_worse(&certain.fit, &beside, &median_condition(dataset), &samples) {
         Some(probability) if probability > sensor_causes::MOST_PROBABILITY => {
             (WrittenFit { errors: search.validation.stage(&without), fit: without }, Some(probability))
         }

@@ -201,7 +201,8 @@ fn excess(
     least.into_iter().take(beyond).flat_map(|s| s.causes.iter().copied()).collect()
 }
 
-/// For each of `causes`, whether it is certain enough for compensation.
+/// For each of `causes`, whether it is certain enough for compensation. Causes beyond the confirmed ones (the smooth correction, which
+/// held-out rows have confirmed) are.
 pub(super) fn certain_flags(
     findings: &[MergedFinding],
     confirmations: &[Confirmation],

@@ -13,6 +13,7 @@ use super::finding::Transfer;
 use super::preparation::prepare;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Observations, errors_on};
+use crate::identification::misreading::OTHER_ARM_MM;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Row, Sensor};
 use crate::measurement::sensor::disturbance::Disturbance;
@@ -117,9 +118,6 @@ const WORSE: f64 = 1.05;
 
 /// The same in standard errors of the mean difference of the squared errors.
 const SURELY: f64 = 2.0;
-
-/// Error along each axis from which readings are of another arm, or in other units or columns (mm).
-const OTHER_ARM_MM: f64 = 25.0;
 
 /// Error of the written arm over its held-out error, and its size (mm), from which the arm was another one there.
 const FOREIGN: f64 = 5.0;

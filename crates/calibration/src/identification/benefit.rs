@@ -263,7 +263,7 @@ fn averaged(
         scale: (!fits_scale(fitted)).then(scale_error).flatten().filter(|s| s.value.is_finite()),
         law,
         readings: readings.count,
-        determined: shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum(),
+        determined: shares.map(|(sigma, prior)| prior.determined_share(sigma * sigma)).sum(),
         parameters: fitted.parameters.len(),
         beyond_noise: None,
     })

@@ -23,6 +23,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_estimation::estimate::{Estimate, Evaluations, Iteration, Termination};
+use truegrind_estimation::problem::effective_parameters;
 use truegrind_estimation::problem::{Prior, Problem};
 use truegrind_math::statistics::{ErrorSummary, median};
 use truegrind_math::work::checkpoint;
@@ -178,7 +179,9 @@ pub fn fit(
             Some(_) => before,
             None => rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles),
         };
-        let determined = effective_parameters(&problem, &estimate);
+        let variances = estimate.covariance.as_ref().map(|covariance| covariance.diagonal());
+        let determined =
+            variances.map_or(0.0, |found| effective_parameters(found.iter().copied(), problem.priors()));
         (sigma_mm, sigma_rad) = noise_sigmas(&problem, &x, &shares, determined);
         rounds.push(estimate.trace.clone());
         if tolerance.learn_widths && round < ROUNDS {
@@ -227,17 +230,6 @@ impl StepBudget {
         self.left = self.left.saturating_sub(estimate.trace.len().saturating_sub(1));
         estimate
     }
-}
-
-/// Effective number of parameters that the data determine: Σ (1 − σ²/prior²).
-fn effective_parameters(problem: &CalibrationProblem, estimate: &Estimate) -> f64 {
-    let Some(covariance) = &estimate.covariance else { return 0.0 };
-    let shares = problem
-        .priors()
-        .iter()
-        .enumerate()
-        .map(|(k, prior)| (1.0 - covariance[(k, k)] / (prior.sigma * prior.sigma)).clamp(0.0, 1.0));
-    shares.sum()
 }
 
 /// The standard deviations σ with Σ r²/(σ² + share) = rows − determined, for lengths and for orientations.

@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use rayon::prelude::*;
 
+use super::misreading::OTHER_ARM_MM;
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad, longer_tool, mean_square_of};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
@@ -167,9 +168,6 @@ pub struct Identification {
     pub parameters: Vec<EstimatedParameter>,
 }
 
-/// RMS error with fitted frames above which the arm or the file is wrong (mm).
-const WRONG_ARM_MM: f64 = 25.0;
-
 /// Identifies `nominal` (catalogue name `robot`) from `dataset`, starting from `frames`; `split` divides the rows that are not
 /// outliers.
 ///
@@ -243,7 +241,7 @@ pub fn identify(
         beyond_noise_rad: None,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region,
-        condition: mean_condition(dataset),
+        condition: median_condition(dataset),
     };
     report_step("estimating the benefit for programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
@@ -345,7 +343,7 @@ struct Trained {
 
 /// Readings that are not of the arm.
 enum WrongArm {
-    /// RMS error with frames alone, above [`WRONG_ARM_MM`].
+    /// RMS error with frames alone, above [`OTHER_ARM_MM`].
     Position { rmse_mm: f64 },
     /// Median orientation error with frames alone, above [`WRONG_ORIENTATION_RAD`].
     Orientation { rad: f64 },
@@ -360,7 +358,7 @@ fn fit_training_rows(
     report_step("fitting the training rows");
     let registered = stages.registered(rows);
     let rmse_mm = summary_on(rows, &registered.model, &registered.frames).rmse;
-    if !(rmse_mm < WRONG_ARM_MM) {
+    if !(rmse_mm < OTHER_ARM_MM) {
         return Err(WrongArm::Position { rmse_mm });
     }
     let turned = median_orientation_error(rows, &registered.model, &registered.frames);
@@ -567,15 +565,16 @@ fn noise_floor(repeats: Option<&Repeats>, observed: &Observations, fitted: &Fitt
     rounding_floor_mm(&observed.dataset, &fitted.model, &fitted.frames, &observed.angles)
 }
 
-pub(crate) fn mean_condition(dataset: &Dataset) -> Condition {
-    let mean = |value: fn(&Condition) -> Option<f64>| {
+/// The condition that a model is stated for: the medians of the logged values.
+pub(crate) fn median_condition(dataset: &Dataset) -> Condition {
+    let median_of = |value: fn(&Condition) -> Option<f64>| {
         let known: Vec<f64> = dataset.rows.iter().filter_map(|r| value(&r.condition)).collect();
         median(&known)
     };
     Condition {
-        time_h: mean(|c| c.time_h),
-        temperature_c: mean(|c| c.temperature_c),
-        payload_kg: mean(|c| c.payload_kg),
+        time_h: median_of(|c| c.time_h),
+        temperature_c: median_of(|c| c.temperature_c),
+        payload_kg: median_of(|c| c.payload_kg),
         ..Condition::default()
     }
 }

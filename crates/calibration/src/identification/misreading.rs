@@ -13,6 +13,10 @@ use truegrind_arm::model::Model;
 use truegrind_math::sentence::listed;
 use truegrind_math::statistics::median;
 
+/// Error with only the frames fitted from which readings are of another arm, or in other units or columns (mm): the RMS for `identify`, the
+/// median for the beginning of a diagnosis, along each axis for a later series and for tracking.
+pub(crate) const OTHER_ARM_MM: f64 = 25.0;
+
 /// An explanation leaves at most this share of the error.
 const SHARE: f64 = 0.1;
 

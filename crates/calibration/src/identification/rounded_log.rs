@@ -23,6 +23,7 @@ use crate::measurement::dataset::Sensor;
 use crate::measurement::noise_floor::NoiseFloor;
 use truegrind_arm::jacobian::joint_jacobian;
 use truegrind_arm::model::Model;
+use truegrind_estimation::problem::{Prior, effective_parameters};
 use truegrind_math::work::checkpoint;
 
 /// What a log that rounds the angles leaves in the readings (mm, RMS over all coordinates of a reading).
@@ -312,14 +313,8 @@ impl Sums {
     }
 }
 
-/// Effective number of parameters of a fit: each counts by the share that its prior does not determine.
-pub(crate) fn spent(
-    covariance: Option<&DMatrix<f64>>,
-    priors: &[truegrind_estimation::problem::Prior],
-) -> f64 {
-    let Some(covariance) = covariance else { return priors.len() as f64 };
-    let share = |(k, prior): (usize, &truegrind_estimation::problem::Prior)| {
-        (1.0 - covariance[(k, k)] / prior.sigma.powi(2)).clamp(0.0, 1.0)
-    };
-    priors.iter().enumerate().map(share).sum()
+/// Effective number of parameters of a fit; all of them where their covariance is not known.
+pub(crate) fn spent(covariance: Option<&DMatrix<f64>>, priors: &[Prior]) -> f64 {
+    let variances = covariance.map(DMatrix::diagonal);
+    variances.map_or(priors.len() as f64, |found| effective_parameters(found.iter().copied(), priors))
 }

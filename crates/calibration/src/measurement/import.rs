@@ -1,6 +1,6 @@
 //! Reads measurement files to a [`Dataset`]; errors name the location in the file.
 //!
-//! Columns are found by header name, in any order: `q1…q6` logged joint angles (deg); one sensor, `L` (mm) or
+//! HeaderColumns are found by header name, in any order: `q1…q6` logged joint angles (deg); one sensor, `L` (mm) or
 //! `measured_x, measured_y, measured_z` (mm) (with `measured_qw … measured_qz` a full pose); optional `x, y, z` (mm),
 //! `t` (h), `session`, `temperature` [°C], `payload` (kg), `approach1…6`, `anchor` or `station`, and `path, cycle, sample` of rows that were read
 //! on a path. Other columns are kept as text.
@@ -30,7 +30,7 @@ pub use options::{Options, TimeMatching};
 use sha2::{Digest, Sha256};
 
 use self::cell::{Cell, Line, Table};
-use self::columns::Columns;
+use self::columns::HeaderColumns;
 use self::tracker_export::Points;
 use super::dataset::Dataset;
 
@@ -128,7 +128,14 @@ fn read_together(
 ) -> Result<Dataset, ImportError> {
     let measured = Points::read(points.0, points.1)?;
     let table = match xlsx::is_workbook(log.1) {
-        true => select_sheet(log.0, xlsx::tables(log.0, log.1)?, options)?,
+        true => {
+            let tables = xlsx::tables(log.0, log.1)?;
+            let stated = stated_sheet(log.0, &tables, options)?;
+            let filled = |table: &&Table| !table.rows.is_empty();
+            let log_of = || tables.iter().find(|table| columns::has_joints(table));
+            let sheet = stated.or_else(log_of).or_else(|| tables.iter().find(filled));
+            sheet.cloned().ok_or(ImportError::Empty { location: Location::file(log.0) })?
+        }
         false => {
             let text = csv::Text::of(log.0, log.1)?;
             let rows = text.lines(log.0).collect::<Result<_, _>>()?;
@@ -139,7 +146,7 @@ fn read_together(
         return Err(ImportError::Empty { location: Location::file(log.0) });
     }
     let (table, notes) = join(measured, table)?;
-    let columns = Columns::find(log.0, &table)?;
+    let columns = HeaderColumns::find(log.0, &table)?;
     let mut dataset = rows::dataset(log.0, &table, &columns, options, std::iter::empty())?;
     dataset.notes.splice(0..0, notes);
     let digest = Sha256::new().chain_update(log.1).chain_update(points.1).finalize();
@@ -147,17 +154,17 @@ fn read_together(
     Ok(dataset)
 }
 
-/// The requested sheet, or the first nonempty one.
-fn select_sheet(file: &str, tables: Vec<Table>, options: &Options) -> Result<Table, ImportError> {
-    let name = |table: &Table| table.sheet.clone().unwrap_or_default();
-    let sheets: Vec<String> = tables.iter().map(name).collect();
-    let wanted = |table: &Table| match &options.sheet {
-        Some(sheet) => table.sheet.as_ref() == Some(sheet),
-        None => !table.rows.is_empty(),
-    };
-    tables.into_iter().find(wanted).ok_or_else(|| match &options.sheet {
-        Some(sheet) => ImportError::UnknownSheet { file: file.into(), sheet: sheet.clone(), sheets },
-        None => ImportError::Empty { location: Location::file(file) },
+/// The sheet that the options name, if they do.
+fn stated_sheet<'t>(
+    file: &str,
+    tables: &'t [Table],
+    options: &Options,
+) -> Result<Option<&'t Table>, ImportError> {
+    let Some(wanted) = &options.sheet else { return Ok(None) };
+    let found = tables.iter().find(|table| table.sheet.as_ref() == Some(wanted));
+    found.map(Some).ok_or_else(|| {
+        let sheets = tables.iter().map(|table| table.sheet.clone().unwrap_or_default()).collect();
+        ImportError::UnknownSheet { file: file.into(), sheet: wanted.clone(), sheets }
     })
 }
 
@@ -190,7 +197,7 @@ pub fn from_rows(
 ) -> Result<Dataset, ImportError> {
     let header = Line { number: 0, cells: names.iter().map(|name| Cell::Text(name.clone())).collect() };
     let table = Table { rows: vec![header], ..Table::default() };
-    let columns = Columns::find(file, &table).map_err(ImportError::without_row)?;
+    let columns = HeaderColumns::find(file, &table).map_err(ImportError::without_row)?;
     let mut digest = Sha256::new();
     digest.update(names.join(","));
     let lines = rows.enumerate().map(|(number, cells)| {
@@ -209,7 +216,7 @@ pub fn from_rows(
 }
 
 fn from_table(file: &str, table: &Table, options: &Options) -> Result<Dataset, ImportError> {
-    match Columns::find(file, table) {
+    match HeaderColumns::find(file, table) {
         Ok(columns) => rows::dataset(file, table, &columns, options, std::iter::empty()),
         Err(error) => from_foreign(file, table, options).unwrap_or(Err(error)),
     }
@@ -218,7 +225,7 @@ fn from_table(file: &str, table: &Table, options: &Options) -> Result<Dataset, I
 /// Reads a table of another program; `None` for an unknown format.
 fn from_foreign(file: &str, table: &Table, options: &Options) -> Option<Result<Dataset, ImportError>> {
     let read = |(table, notes): (Table, Vec<String>)| {
-        let columns = Columns::find(file, &table)?;
+        let columns = HeaderColumns::find(file, &table)?;
         let mut dataset = rows::dataset(file, &table, &columns, options, std::iter::empty())?;
         dataset.notes.splice(0..0, notes);
         Ok(dataset)
@@ -235,7 +242,7 @@ fn from_text(file: &str, text: &csv::Text<'_>, options: &Options) -> Result<Data
     {
         table.rows.push(line?);
     }
-    match Columns::find(file, &table) {
+    match HeaderColumns::find(file, &table) {
         Ok(columns) => rows::dataset(file, &table, &columns, options, lines),
         Err(error) => {
             for line in lines {
@@ -248,14 +255,10 @@ fn from_text(file: &str, text: &csv::Text<'_>, options: &Options) -> Result<Data
 
 fn from_workbook(file: &str, tables: &[Table], options: &Options) -> Result<Dataset, ImportError> {
     let name = |t: &Table| t.sheet.clone().unwrap_or_default();
-    if let Some(wanted) = &options.sheet {
-        let table = tables.iter().find(|t| t.sheet.as_ref() == Some(wanted)).ok_or_else(|| {
-            let sheets = tables.iter().map(name).collect::<Vec<_>>();
-            ImportError::UnknownSheet { file: file.into(), sheet: wanted.clone(), sheets }
-        })?;
+    if let Some(table) = stated_sheet(file, tables, options)? {
         return from_table(file, table, options);
     }
-    let mut usable = tables.iter().filter(|t| Columns::find(file, t).is_ok());
+    let mut usable = tables.iter().filter(|t| HeaderColumns::find(file, t).is_ok());
     let Some(table) = usable.next() else {
         if let Some(found) = tables.iter().find_map(|table| from_foreign(file, table, options)) {
             return found;

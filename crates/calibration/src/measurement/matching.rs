@@ -44,7 +44,7 @@ pub enum Mismatch {
 ///
 /// # Errors
 /// [`Mismatch`].
-pub fn match_to_arm(
+pub fn prepare_rows(
     mut dataset: Dataset,
     robot: &str,
     nominal: &Model,

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::identification::misreading::OTHER_ARM_MM;
 use crate::identification::start::StartError;
 
 /// Why an arm cannot be tracked.
@@ -97,9 +98,6 @@ pub enum StateError {
         expected: &'static str,
     },
 }
-
-/// Error along each axis above which readings are of another arm (mm).
-const OTHER_ARM_MM: f64 = 25.0;
 
 fn what_to_do(left_mm: f64, changed_mm: Option<f64>) -> String {
     if left_mm > OTHER_ARM_MM {

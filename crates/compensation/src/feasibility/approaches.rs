@@ -22,7 +22,7 @@ pub(crate) struct Starts<'a> {
     starts: StartsOf<'a>,
     /// Representatives of cuts with their motions, sorted.
     of_cuts: Vec<(u32, u32)>,
-    /// Behind which motions another begins that may cut.
+    /// After which motions another begins that may cut.
     goes_on: Vec<bool>,
     /// Whether a cut remains unmodified as a whole.
     whole: bool,

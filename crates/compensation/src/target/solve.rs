@@ -175,7 +175,7 @@ impl<'t> TargetSolver<'_, 't> {
             self.originals[self.ranges.of_motion(*m)]
                 .iter()
                 .flatten()
-                .any(|start| start.guess == BranchGuess::Guessed)
+                .any(|original| original.guess == BranchGuess::Guessed)
         };
         let motions = (0..self.listing.motions.len()).into_par_iter().with_min_len(search_budget::MANY);
         motions.filter(guessed).map(|m| m as u32).collect()
@@ -188,7 +188,7 @@ impl<'t> TargetSolver<'_, 't> {
 
     /// One slot per target.
     fn unsolved(&self) -> Vec<Result<SolvedTarget<'t>, OutcomeReason>> {
-        self.target_refs.par_iter().map(|_| Err(OutcomeReason::JointTarget)).collect()
+        self.target_refs.par_iter().map(|_| Err(UNSOLVED)).collect()
     }
 
     /// Solves all targets, or only the `stale` portions; `before`: the conditions of the original program.
@@ -313,6 +313,9 @@ impl<'t> TargetSolver<'_, 't> {
     }
 }
 
+/// What stands for a target that is not solved yet; no target keeps it.
+const UNSOLVED: OutcomeReason = OutcomeReason::JointTarget;
+
 /// Solves one portion of targets into `out`.
 fn solve_portion<'t>(
     target_refs: &[TargetRef<'t>],
@@ -324,25 +327,24 @@ fn solve_portion<'t>(
 ) {
     let TargetSolver { frame_table, assessment, options, .. } = *work;
     let conditions = &arms.conditions;
-    // Placeholder for targets that are being solved.
-    let waiting = |start: &Result<OriginalTarget<'_>, OutcomeReason>| {
-        Err(start.as_ref().err().copied().unwrap_or(OutcomeReason::JointTarget))
+    let waiting = |original: &Result<OriginalTarget<'_>, OutcomeReason>| {
+        Err(original.as_ref().err().copied().unwrap_or(UNSOLVED))
     };
-    out.iter_mut().zip(originals).for_each(|(out, start)| *out = waiting(start));
+    out.iter_mut().zip(originals).for_each(|(out, original)| *out = waiting(original));
     let reachable = reachable_targets(originals, condition_indices, arms, frame_table, out);
     let joint_form = |w: &ReachableTarget<'_, '_>| {
         as_joints(target_refs[w.index].motion, target_refs[w.index].target, options.emit)
     };
-    let ControllerReplay { told_flanges, commanded, read_back, branches, last, failed } =
+    let ControllerReplay { nominal_flanges, commanded, read_back, branches, last, failed } =
         replay_controller(&reachable, &joint_form, arms, frame_table, options);
-    let real = |start: &OriginalTarget<'_>| &frame_table.list[start.frames_index].real;
+    let real = |original: &OriginalTarget<'_>| &frame_table.list[original.frames_index].real;
     let condition_indices: Vec<usize> = reachable.iter().map(|w| w.condition_index).collect();
     let reached_after = conditions.forward(&condition_indices, &last);
-    let tools: Vec<Pose> = reachable.iter().map(|w| real(w.start).flange_from_tool(&w.flange)).collect();
+    let tools: Vec<Pose> = reachable.iter().map(|w| real(w.original).flange_from_tool(&w.flange)).collect();
     let cut_of = |w: &ReachableTarget<'_, '_>| target_refs[w.index].index;
     let against = |w: &ReachableTarget<'_, '_>| {
         (
-            frame_table.list[w.start.frames_index].carried.as_ref().map(RegisteredFrame::carried),
+            frame_table.list[w.original.frames_index].carried.as_ref().map(RegisteredFrame::carried),
             assessment.registered(cut_of(w), target_refs[w.index].motion.work_object),
         )
     };
@@ -353,21 +355,21 @@ fn solve_portion<'t>(
             out[w.index] = Err(why);
             continue;
         }
-        let real = real(w.start);
+        let real = real(w.original);
         let intended = w.intended;
         let reached = [w.reached_before, real.target_of(&reached_after[k])];
         let deviation = |reached: Pose| Deviation::between(&intended, &reached, &Pose::identity(), None);
         let play_uncertainty_mm = conditions.play_uncertainty_mm(w.condition_index, &w.after, &tools[k]);
         let (conf, margins) = branches[k];
         let mut solved = SolvedTarget {
-            frames_index: w.start.frames_index,
-            intended: w.start.intended.clone(),
-            before: w.start.joints,
+            frames_index: w.original.frames_index,
+            intended: w.original.intended.clone(),
+            before: w.original.joints,
             after: w.after,
             commanded: commanded[k],
-            cfx_before: w.start.cfx,
+            cfx_before: w.original.cfx,
             conf,
-            margins: [w.start.margins, margins],
+            margins: [w.original.margins, margins],
             deviation_mm: reached.map(|pose| (pose.translation.vector - intended.translation.vector).norm()),
             deviations: options.points.then(|| Box::new(reached.map(deviation))),
             sigma_mm: predicted[k].0.hypot(play_uncertainty_mm),
@@ -378,14 +380,14 @@ fn solve_portion<'t>(
                 .into(),
             play_uncertainty_mm,
             condition_index: w.condition_index,
-            guess: w.start.guess,
+            guess: w.original.guess,
             outside: arms.knowledge.and_then(|k| k.region.outside_along(&w.after, &mut near)).map(Box::new),
             forbidden: None,
         };
         let forbidden = forbidden(&solved, w.singularity, arms, options).or_else(|| {
             let frames = &frame_table.list[solved.frames_index].commanded;
             let stated = if joint_form(w) { None } else { stated(&target_refs[w.index]) };
-            let (flange, read_back, joints) = (&told_flanges[k], &read_back[k], &last[k]);
+            let (flange, read_back, joints) = (&nominal_flanges[k], &read_back[k], &last[k]);
             let replay = WrittenTarget { frames, flange, read_back, joints, stated };
             target_fault(&solved, w.singularity, &replay, arms, options)
         });
@@ -406,10 +408,10 @@ fn reachable_targets<'o, 't>(
     let open: Vec<(usize, &OriginalTarget<'t>)> = originals
         .iter()
         .enumerate()
-        .filter_map(|(index, start)| Some((index, start.as_ref().ok()?)))
+        .filter_map(|(index, original)| Some((index, original.as_ref().ok()?)))
         .collect();
     let before: Vec<Joints> = open.iter().map(|(_, s)| s.joints).collect();
-    let real = |start: &OriginalTarget<'_>| &frame_table.list[start.frames_index].real;
+    let real = |original: &OriginalTarget<'_>| &frame_table.list[original.frames_index].real;
     let intended: Vec<Pose> = open.iter().map(|(_, s)| s.intended.pose()).collect();
     let flanges: Vec<Pose> =
         open.iter().zip(&intended).map(|((_, s), intended)| real(s).flange_for(intended)).collect();
@@ -423,17 +425,17 @@ fn reachable_targets<'o, 't>(
             .solve_offset_seeded(&select(&flanges, items), &select(&before, items)),
     });
     let mut reachable: Vec<ReachableTarget<'o, 't>> = Vec::with_capacity(open.len());
-    for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
+    for (k, ((index, original), solution)) in open.iter().zip(solutions).enumerate() {
         match solution {
             Ok(solution) => reachable.push(ReachableTarget {
                 index: *index,
-                start,
+                original,
                 intended: intended[k],
                 condition_index: condition_indices[k],
                 flange: flanges[k],
                 after: solution.joints,
                 singularity: solution.singularity,
-                reached_before: real(start).target_of(&reached_before[k]),
+                reached_before: real(original).target_of(&reached_before[k]),
             }),
             Err(error) => out[*index] = Err(OutcomeReason::of_inverse(error)),
         }
@@ -443,7 +445,7 @@ fn reachable_targets<'o, 't>(
 
 /// Commanded poses, and what the controller computes from the rounded numbers.
 struct ControllerReplay {
-    told_flanges: Vec<Pose>,
+    nominal_flanges: Vec<Pose>,
     commanded: Vec<Pose>,
     /// Flange poses of the rounded numbers.
     read_back: Vec<Pose>,
@@ -462,15 +464,15 @@ fn replay_controller(
     options: &Options,
 ) -> ControllerReplay {
     let after: Vec<Joints> = reachable.iter().map(|w| w.after).collect();
-    let told_flanges = arms.nominal.arm().forward_many(&after);
-    let mounting = |w: &ReachableTarget<'_, '_>| &frame_table.list[w.start.frames_index].commanded;
+    let nominal_flanges = arms.nominal.arm().forward_many(&after);
+    let mounting = |w: &ReachableTarget<'_, '_>| &frame_table.list[w.original.frames_index].commanded;
     let commanded: Vec<Pose> =
-        reachable.iter().zip(&told_flanges).map(|(w, flange)| mounting(w).target_of(flange)).collect();
+        reachable.iter().zip(&nominal_flanges).map(|(w, flange)| mounting(w).target_of(flange)).collect();
     let scale = 10f64.powi(i32::from(options.position_decimals));
-    let hears = |(w, commanded): (&ReachableTarget<'_, '_>, &Pose)| {
+    let as_written = |(w, commanded): (&ReachableTarget<'_, '_>, &Pose)| {
         mounting(w).flange_for(&rounded(commanded, scale))
     };
-    let read_back: Vec<Pose> = reachable.iter().zip(&commanded).map(hears).collect();
+    let read_back: Vec<Pose> = reachable.iter().zip(&commanded).map(as_written).collect();
     let reached = if reachable.iter().all(joint_form) {
         Vec::new()
     } else {
@@ -493,7 +495,7 @@ fn replay_controller(
         last.push(joints);
         branches.push(branch);
     }
-    ControllerReplay { told_flanges, commanded, read_back, branches, last, failed }
+    ControllerReplay { nominal_flanges, commanded, read_back, branches, last, failed }
 }
 
 /// Predicted standard deviation of each point (mm) relative to its reference frame, and to the registration of its cut where there is
@@ -537,7 +539,7 @@ fn stated<'a>(target_refs: &TargetRef<'a>) -> Option<&'a RobTarget> {
 /// A target whose corrected joints are known.
 struct ReachableTarget<'o, 't> {
     index: usize,
-    start: &'o OriginalTarget<'t>,
+    original: &'o OriginalTarget<'t>,
     intended: Pose,
     condition_index: usize,
     flange: Pose,

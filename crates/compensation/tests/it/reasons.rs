@@ -11,8 +11,8 @@ use truegrind_compensation::cut::Cuts;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::options::{Circles, Options};
 use truegrind_compensation::plan::Plan;
-use truegrind_compensation::plan::planner::plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
+use truegrind_compensation::plan::solved_program::plan;
 use truegrind_programs::motion::Reason;
 use truegrind_programs::rapid::Task;
 

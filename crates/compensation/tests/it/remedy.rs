@@ -25,7 +25,7 @@ use truegrind_calibration::measurement::{import, split};
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::frames::taught::taught_frame;
 use truegrind_compensation::options::Options;
-use truegrind_compensation::plan::planner::plan;
+use truegrind_compensation::plan::solved_program::plan;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_compensation::risk::remedy::{Measurement, Remedy};
 use truegrind_estimation::least_squares::lm;

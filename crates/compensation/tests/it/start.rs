@@ -11,7 +11,7 @@ use truegrind_compensation::deviation::After;
 use truegrind_compensation::frames::taught::contradictions;
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
-use truegrind_compensation::plan::planner::plan;
+use truegrind_compensation::plan::solved_program::plan;
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind_programs::motion::{Frame, Listing, NcFacts};
 use truegrind_programs::nc::Task;

@@ -60,7 +60,7 @@ pub(crate) trait Transfer {
     fn evaluate(&mut self, _node: u32) {}
     /// At the head of a loop: what the loop changes is unknown.
     fn enter_loop(&mut self, _node: u32) {}
-    /// Behind a loop that was entered with `before`.
+    /// After a loop that was entered with `before`.
     fn leave_loop(&mut self, _node: u32, _before: &Self::State) {}
     /// At the end of a handler.
     fn end_handler(&mut self, _node: u32, _end: Self::State) {}

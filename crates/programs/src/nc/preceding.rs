@@ -16,7 +16,7 @@ pub(super) struct Preceding {
 }
 
 impl Preceding {
-    /// Behind a motion.
+    /// After a motion.
     pub(super) fn after(motion: u32) -> Self {
         Preceding { motions: smallvec![motion], joined: false }
     }

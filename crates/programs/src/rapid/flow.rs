@@ -108,8 +108,15 @@ pub(super) struct Exit {
 
 /// Receives what the interpreter finds.
 pub(super) trait Visitor {
-    /// A call; returns the index of the motion if it is one.
-    fn visit_call(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Option<u32>;
+    /// A call, with the index in the table of instructions if it is `known` there; returns the index of the motion if it is one.
+    fn visit_call(
+        &mut self,
+        unit: Unit,
+        node: u32,
+        known: Option<usize>,
+        state: &AbstractState,
+        nesting: Nesting,
+    ) -> Option<u32>;
     /// What holds at the end of a routine.
     fn exit_of(&mut self, routine: u32) -> Exit;
     /// A call of a routine of the program.
@@ -369,7 +376,7 @@ impl Interpreter<'_, '_, '_> {
             return;
         }
         let tree = &self.evaluator.trees[self.unit.file as usize];
-        for node in node..tree.nodes.behind(node) {
+        for node in node..tree.nodes.subtree_end(node) {
             let decides = match tree.nodes.kind(node) {
                 Syntax::Function | Syntax::Call => {
                     let called = symbols.callees(self.unit.scope, tree.text(tree.nodes.first(node)));
@@ -499,7 +506,7 @@ impl Interpreter<'_, '_, '_> {
     /// The switches that statements under a node may set.
     fn switches_set_under(&mut self, node: u32) -> SwitchSet {
         let tree = &self.evaluator.trees[self.unit.file as usize];
-        let end = tree.nodes.behind(node);
+        let end = tree.nodes.subtree_end(node);
         let symbols = self.evaluator.symbols;
         let mut out = SwitchSet::EMPTY;
         for &node in symbols.switch_calls_in(self.unit, node..end) {
@@ -533,12 +540,11 @@ impl Interpreter<'_, '_, '_> {
         for inside in tree.child_nodes(node) {
             self.invalidate_changed(inside, state);
         }
-        let motion = self.visitor.visit_call(self.unit, node, state, nesting);
-        let known = if late { None } else { instruction::find(name).map(|known| &INSTRUCTIONS[known]) };
         let hidden = symbols.hides_instruction && symbols.routine(self.unit.scope, name).is_some();
-        let known = known.filter(|_| !hidden);
+        let known = if late || hidden { None } else { instruction::find(name) };
+        let motion = self.visitor.visit_call(self.unit, node, known, state, nesting);
         if let Some(known) = known {
-            self.transfer_motion_instruction(node, known, motion, state);
+            self.transfer_motion_instruction(node, &INSTRUCTIONS[known], motion, state);
             return;
         }
         let incremented = self.incremented(node, state, name);

@@ -78,7 +78,7 @@ impl ReachingMotions {
         out
     }
 
-    /// Behind a loop that was entered with `outside`.
+    /// After a loop that was entered with `outside`.
     pub(super) fn leave_loop(&mut self, outside: &Self) {
         self.any_in_loop = outside.any_in_loop;
     }

@@ -180,7 +180,7 @@ struct Rewriter<'r, 's> {
     edits: Vec<Edits>,
     /// Every name in use, lower case, once a new one is needed.
     names: Option<HashSet<Vec<u8>>>,
-    /// Declarations (with the first byte of the literal) that were edited in place.
+    /// Declarations that were edited in place; the elements of an array count as one.
     moved_bases: HashSet<u32>,
 }
 
@@ -409,7 +409,7 @@ impl<'r, 's> Rewriter<'r, 's> {
                 }
                 Outcome::Inlined
             } else {
-                let name = self.clone_of(index, &text);
+                let name = self.clone_of(index, &old, &text);
                 for update in &group {
                     let motion = &task.listing.motions[update.motion as usize];
                     let edits = &mut self.edits[motion.place.file as usize];
@@ -438,15 +438,15 @@ impl<'r, 's> Rewriter<'r, 's> {
         }
     }
 
-    /// Declares a constant with this value beside a declaration; returns its name.
-    fn clone_of(&mut self, index: u32, literal: &[u8]) -> String {
+    /// Declares a constant with this value beside a declaration, of the type of its `old` value; returns its name.
+    fn clone_of(&mut self, index: u32, old: &TargetValue, literal: &[u8]) -> String {
         let declaration = &self.task.listing.declarations[index as usize];
         let file = declaration.place.file as usize;
         let source = self.task.sources[file];
         let name = self.new_name(&declaration.name);
         let statement = &source[declaration.statement.range()];
         let local = statement.len() >= 5 && same_name(&statement[..5], b"LOCAL");
-        let joints = super::literal::numbers(literal, super::literal::ROBTARGET).is_none();
+        let joints = matches!(old, TargetValue::Joint(_));
         // After the declaration and a comment on the same line.
         let end = declaration.statement.end as usize;
         let line = source[end..].iter().position(|&byte| byte == b'\n').map_or(source.len(), |at| end + at);
@@ -554,11 +554,8 @@ fn circle_point(source: &[u8], motion: &Motion) -> Option<[std::ops::Range<usize
     let via = motion.via()?;
     let mut argument = via.argument.range();
     // `CirPoint := p20` is deleted with its name.
-    if let Some(before) = source[..argument.start].trim_ascii_end().strip_suffix(b":=") {
-        let name = before.trim_ascii_end();
-        let long =
-            name.iter().rev().take_while(|byte| byte.is_ascii_alphanumeric() || **byte == b'_').count();
-        argument.start = name.len() - long;
+    if let Some(name) = named_before(source, argument.start) {
+        argument.start = name.start;
     }
     let mut at = argument.end;
     while let Some(&byte) = source.get(at).filter(|_| at < motion.statement.end as usize) {

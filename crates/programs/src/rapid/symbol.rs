@@ -457,7 +457,7 @@ impl Symbols {
             let symbol = Symbol::new((file, inner), parameter.name, SymbolKind::Parameter, type_name);
             self.declare(tree.text(parameter.name), symbol.varying(), false);
         }
-        for inside in node + 1..tree.nodes.behind(node) {
+        for inside in node + 1..tree.nodes.subtree_end(node) {
             match tree.nodes.kind(inside) {
                 Syntax::Data => self.declare_data(tree, file, inner, inside, false),
                 Syntax::For => {
@@ -484,11 +484,11 @@ impl Symbols {
 
     /// The variables of the loops of a fragment, outside routines.
     fn collect_loop_variables(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32) {
-        let (mut at, end) = (node + 1, tree.nodes.behind(node));
+        let (mut at, end) = (node + 1, tree.nodes.subtree_end(node));
         while at < end {
             let kind = tree.nodes.kind(at);
             if kind.is_routine() || kind == Syntax::Module {
-                at = tree.nodes.behind(at);
+                at = tree.nodes.subtree_end(at);
                 continue;
             }
             if kind == Syntax::For {

@@ -19,14 +19,14 @@ use rayon::prelude::*;
 
 use super::evaluate::{Context, Evaluator};
 use super::flow::{AbstractState, CallSite, Exit, Visitor, interpret_unit};
-use super::instruction::{self, INSTRUCTIONS};
+use super::instruction::INSTRUCTIONS;
 use super::mark;
 use super::modal::SwitchSet;
 use super::parser::parse;
 use super::payload::{self, Gripped};
 use super::reaching_motions::ReachingMotions;
 use super::symbol::{Symbols, Unit};
-use super::syntax::{RapidTree, Syntax};
+use super::syntax::RapidTree;
 use crate::dataflow::Nesting;
 use crate::motion::load::{Load, Loads};
 use crate::motion::{Listing, MotionTarget, OpaqueRegion, Place, Reason, Role};
@@ -327,18 +327,25 @@ impl<'a, 's> ListingBuilder<'a, 's> {
 }
 
 impl Visitor for ListingBuilder<'_, '_> {
-    fn visit_call(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Option<u32> {
+    fn visit_call(
+        &mut self,
+        unit: Unit,
+        node: u32,
+        known: Option<usize>,
+        state: &AbstractState,
+        nesting: Nesting,
+    ) -> Option<u32> {
         if self.depth > 0 {
             return None;
         }
         let tree = &self.trees[unit.file as usize];
-        let late = tree.nodes.kind(node) == Syntax::LateCall;
-        let name = tree.text(tree.nodes.first(node));
-        let hidden = self.symbols.hides_instruction && self.symbols.routine(unit.scope, name).is_some();
-        let known = if late || hidden { None } else { instruction::find(name) };
         let motion = match known {
-            Some(known) => self.table_motion(unit, node, state, nesting, known),
-            None => self.other_motion(unit, node, state, nesting)?,
+            Some(known) => Some(self.table_motion(unit, node, state, nesting, known)),
+            None => self.other_motion(unit, node, state, nesting),
+        };
+        let Some(motion) = motion else {
+            self.record_outside_call(unit, node);
+            return None;
         };
         let index = self.listing.motions.len() as u32;
         self.call_edges.arrive(self.unit, index, motion.previous.is_none(), &state.reaching);

@@ -92,7 +92,7 @@ impl<N: Copy> Nodes<N> {
 
     /// One past the last node of a node's subtree.
     #[inline]
-    pub fn behind(&self, node: u32) -> u32 {
+    pub fn subtree_end(&self, node: u32) -> u32 {
         let size = self.packed[node as usize].size;
         node + if size == LARGE { self.sizes(node).0 } else { size.into() }
     }

@@ -92,7 +92,7 @@ fn the_dialect_of_each_sample_is_detected() {
 fn check(source: &[u8], dialect: Dialect) {
     let tree = parse(source, dialect);
     assert_eq!(tree.print(), source);
-    assert_eq!(tree.nodes.behind(0), tree.nodes.len());
+    assert_eq!(tree.nodes.subtree_end(0), tree.nodes.len());
     let mut open: Vec<(usize, u32, u32)> = vec![];
     for (index, node) in tree.nodes.iter().enumerate() {
         while open.last().is_some_and(|&(end, ..)| end <= index) {

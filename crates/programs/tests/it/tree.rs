@@ -61,7 +61,7 @@ ENDMODULE
 fn check(source: &[u8]) {
     let tree = parse(source);
     assert_eq!(tree.print(), source);
-    assert_eq!(tree.nodes.behind(0), tree.nodes.len());
+    assert_eq!(tree.nodes.subtree_end(0), tree.nodes.len());
     assert_eq!(tree.nodes.get(0).end as usize, tree.len());
     // Every node lies inside its parent and siblings do not overlap.
     let mut open: Vec<(usize, u32, u32)> = vec![];

@@ -78,7 +78,7 @@ pub struct Row {
     pub reading: Reading,
     /// Time, temperature, payload and approach sides, where logged; rows of one condition share it.
     pub condition: Arc<Condition>,
-    /// Which cable outlet (0-based) the row belongs to.
+    /// Index of the cable outlet; of a tracker or camera that of the station.
     pub anchor: usize,
     /// Fields that only some rows have.
     pub extra: Option<Box<Extra>>,

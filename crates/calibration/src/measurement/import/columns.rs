@@ -9,7 +9,7 @@ use crate::measurement::dataset::Sensor;
 
 /// Column indices.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Columns {
+pub(super) struct HeaderColumns {
     /// Index of the header in the table's rows.
     pub(super) header: usize,
     /// Width of the header up to the last name.
@@ -18,7 +18,7 @@ pub(super) struct Columns {
     pub(super) joints: [usize; 6],
     /// The sensor.
     pub(super) sensor: Sensor,
-    /// Columns of the sensor: L, or x y z, or x y z qw qx qy qz.
+    /// HeaderColumns of the sensor: L, or x y z, or x y z qw qx qy qz.
     pub(super) reading: Vec<usize>,
     /// x, y, z of the controller.
     pub(super) readout: Option<[usize; 3]>,
@@ -36,13 +36,13 @@ pub(super) struct Columns {
     pub(super) station: Option<usize>,
     /// path, cycle, sample, where all three are there.
     pub(super) path: Option<[usize; 3]>,
-    /// Columns that are kept but not used.
+    /// HeaderColumns that are kept but not used.
     pub(super) other: Vec<(String, usize)>,
     /// Notes for the user.
     pub(super) notes: Vec<String>,
 }
 
-impl Columns {
+impl HeaderColumns {
     /// Finds the columns, or reports missing, duplicate or superfluous ones.
     pub(super) fn find(file: &str, table: &Table) -> Result<Self, ImportError> {
         let mut location = Location { sheet: table.sheet.as_deref().map(Into::into), ..Location::file(file) };
@@ -189,11 +189,19 @@ const TITLES: usize = 20;
 
 /// The first row with a joint's name, else the first nonempty row.
 fn header_row(rows: &[Line]) -> Option<usize> {
-    let names_a_joint = |line: &Line| line.cells.iter().any(|cell| joint(&cell.to_string()).is_some());
     rows.iter()
         .take(TITLES)
         .position(names_a_joint)
         .or_else(|| rows.iter().position(|line| line.cells.iter().any(|c| !c.is_empty())))
+}
+
+/// Whether a sheet has a header that names a joint.
+pub(super) fn has_joints(table: &Table) -> bool {
+    table.rows.iter().take(TITLES).any(names_a_joint)
+}
+
+fn names_a_joint(line: &Line) -> bool {
+    line.cells.iter().any(|cell| joint(&cell.to_string()).is_some())
 }
 
 fn sensor_columns(

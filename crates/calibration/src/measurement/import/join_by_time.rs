@@ -6,7 +6,7 @@
 use super::cell::{Cell, Line, Table};
 use super::clock::{FORMS, Stamp};
 use super::column_names::POSITION;
-use super::columns::Columns;
+use super::columns::HeaderColumns;
 use super::error::{ImportError, Location};
 use super::options::TimeMatching;
 use super::tracker_export::{Point, Points, cells, headed, unusable};
@@ -52,7 +52,7 @@ pub(super) fn join_by_time(
     log.rows.drain(..header);
     log.rows.iter_mut().for_each(|line| line.cells.resize(width, Cell::Empty));
     log.rows[0].cells.extend(POSITION.map(|name| Cell::Text(name.to_owned())));
-    let columns = Columns::find(file, &log)?;
+    let columns = HeaderColumns::find(file, &log)?;
     let (logged, measured) = times(points, &log, column, &location)?;
     let pairing = Pairing { points, log: &log, joints: columns.joints, clocks, logged, measured };
     let pairs = pairing.pairs(file, &location)?;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::cell::{Cell, Line, Table};
-use super::columns::Columns;
+use super::columns::HeaderColumns;
 use super::error::{ImportError, Location};
 use super::options::Options;
 use super::rounding;
@@ -24,7 +24,7 @@ const QUATERNION_TOLERANCE: f64 = 1e-3;
 pub(super) fn dataset(
     file: &str,
     table: &Table,
-    columns: &Columns,
+    columns: &HeaderColumns,
     options: &Options,
     further: impl Iterator<Item = Result<Line, ImportError>>,
 ) -> Result<Dataset, ImportError> {
@@ -134,7 +134,7 @@ impl Stations {
 }
 
 /// Refuses more outlets or stations than can be identified.
-fn check_outlets(reader: &Reader<'_>, columns: &Columns, rows: &[Row]) -> Result<(), ImportError> {
+fn check_outlets(reader: &Reader<'_>, columns: &HeaderColumns, rows: &[Row]) -> Result<(), ImportError> {
     let places = rows.iter().map(|row| row.anchor + 1).max().unwrap_or(1);
     if places <= MOST_OUTLETS {
         return Ok(());
@@ -267,7 +267,12 @@ impl Reader<'_> {
         }
     }
 
-    fn row(&self, line: &Line, columns: &Columns, conditions: &mut Conditions) -> Result<Row, ImportError> {
+    fn row(
+        &self,
+        line: &Line,
+        columns: &HeaderColumns,
+        conditions: &mut Conditions,
+    ) -> Result<Row, ImportError> {
         let mut joints = Joints::zeros();
         for (q, &column) in joints.iter_mut().zip(&columns.joints) {
             let angle = self.bounded(line, column, LARGEST_DEG, "an angle in degrees, within ±3600")?;
@@ -330,7 +335,7 @@ impl Reader<'_> {
     }
 
     /// The sensor's reading.
-    fn reading(&self, line: &Line, columns: &Columns) -> Result<Reading, ImportError> {
+    fn reading(&self, line: &Line, columns: &HeaderColumns) -> Result<Reading, ImportError> {
         let values: Vec<f64> = columns
             .reading
             .iter()
@@ -349,7 +354,7 @@ impl Reader<'_> {
     }
 
     /// The sampling point on a path; `None` where the arm stood still.
-    fn path(&self, line: &Line, columns: &Columns) -> Result<Option<PathPoint>, ImportError> {
+    fn path(&self, line: &Line, columns: &HeaderColumns) -> Result<Option<PathPoint>, ImportError> {
         let Some([path, cycle, sample]) = columns.path else { return Ok(None) };
         let is_empty = |column: usize| line.cells.get(column).is_none_or(Cell::is_empty);
         if [path, cycle, sample].into_iter().all(is_empty) {
@@ -384,7 +389,7 @@ impl Reader<'_> {
     }
 
     /// The approach side of each joint.
-    fn approach(&self, line: &Line, columns: &Columns) -> Result<[i8; 6], ImportError> {
+    fn approach(&self, line: &Line, columns: &HeaderColumns) -> Result<[i8; 6], ImportError> {
         let mut approach = [0i8; 6];
         for (side, column) in approach.iter_mut().zip(columns.approach) {
             *side = match self.optional(line, column)? {
@@ -403,7 +408,7 @@ impl Reader<'_> {
     fn quaternion(
         &self,
         line: &Line,
-        columns: &Columns,
+        columns: &HeaderColumns,
         q: Quaternion<f64>,
     ) -> Result<UnitQuaternion<f64>, ImportError> {
         if (q.norm() - 1.0).abs() <= QUATERNION_TOLERANCE {

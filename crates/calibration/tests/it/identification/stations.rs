@@ -11,7 +11,7 @@ use truegrind_calibration::identification::register::starting_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::convention::AngleConvention;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading};
-use truegrind_calibration::measurement::matching::{Mismatch, match_to_arm};
+use truegrind_calibration::measurement::matching::{Mismatch, prepare_rows};
 use truegrind_calibration::measurement::simulation::recipe::Recipe;
 use truegrind_calibration::measurement::{import, split};
 use truegrind_calibration::tracking::{Options as TrackOptions, Tracker};
@@ -138,7 +138,7 @@ fn a_small_station_makes_no_held_out_error_of_a_diagnosis() {
 }
 
 fn matched(rows: Dataset) -> Dataset {
-    match_to_arm(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap()
+    prepare_rows(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap()
 }
 
 fn identified(rows: &Dataset) -> Identification {
@@ -194,7 +194,7 @@ fn a_station_with_too_few_rows_is_refused_by_name() {
     let kept: Vec<usize> = (0..rows.rows.len()).filter(|&i| rows.rows[i].anchor != 1 || i < 32).collect();
     rows = rows.subset(&kept);
     let refusal =
-        |rows| match_to_arm(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap_err();
+        |rows| prepare_rows(rows, "abb-irb-120", &arm(), AngleConvention::Logged, false).unwrap_err();
     let refused = refusal(rows.clone());
     assert!(matches!(&refused, Mismatch::Station(why) if (&*why.station, why.rows) == ("2", 2)), "{refused}");
     // As typed, with its rows: an "s1" among "S1".

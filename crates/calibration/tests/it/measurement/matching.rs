@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use truegrind_arm::model::Joints;
 use truegrind_calibration::measurement::convention::AngleConvention;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
-use truegrind_calibration::measurement::matching::match_to_arm;
+use truegrind_calibration::measurement::matching::prepare_rows;
 
 /// Rows at poses of their own, read to 0.1 µm.
 fn rows(count: usize) -> Vec<Row> {
@@ -23,7 +23,7 @@ fn matched(rows: Vec<Row>) -> Dataset {
     let nominal = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
     let dataset = Dataset::new("rows.csv", Sensor::Position, rows);
     // The readings are of no arm, so units cannot be told.
-    match_to_arm(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, true).unwrap()
+    prepare_rows(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, true).unwrap()
 }
 
 fn numbers(dataset: &Dataset) -> Vec<usize> {
@@ -74,7 +74,7 @@ fn rows_copied_to_another_time_count_once() {
     let nominal = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
     let mut coarse = Dataset::new("rows.csv", Sensor::Position, later(twice));
     coarse.reading_step_mm = Some(0.1);
-    let coarse = match_to_arm(coarse, "abb-irb-120", &nominal, AngleConvention::Logged, true).unwrap();
+    let coarse = prepare_rows(coarse, "abb-irb-120", &nominal, AngleConvention::Logged, true).unwrap();
     assert_eq!(coarse.rows.len(), 6);
 }
 
@@ -128,7 +128,7 @@ fn rows_of_mixed_sessions_are_brought_together() {
 fn refused(rows: Vec<Row>) -> Option<String> {
     let nominal = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
     let dataset = Dataset::new("rows.csv", Sensor::Position, rows);
-    match_to_arm(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, false)
+    prepare_rows(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, false)
         .err()
         .map(|error| error.to_string())
 }
@@ -157,7 +157,7 @@ fn a_reading_beyond_all_reach_is_left_out() {
     let nominal = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
     let of = |rows: Vec<Row>| {
         let dataset = Dataset::new("rows.csv", Sensor::Position, rows);
-        match_to_arm(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, false).unwrap()
+        prepare_rows(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, false).unwrap()
     };
     let mut wrong = rows(20);
     wrong[7].reading = Reading::Position(Vector3::new(1007.0, 65535.0, 0.0));

@@ -11,14 +11,14 @@ pub(super) enum Site {
     Label(Variable),
     /// A program or subprogram.
     Program(Variable),
-    /// Behind the calls of a program or label.
+    /// After the calls of a program or label.
     Return(Variable),
     /// The head of a loop, by the block that opens it.
     Head(u32),
     /// The branch of this number, if the conditions before it are false.
     Branch(u32, u32),
-    /// Behind a loop or branches.
-    Behind(u32),
+    /// After a loop or branches.
+    After(u32),
 }
 
 /// The states that arrive at each place of a file.
@@ -40,7 +40,7 @@ pub(super) struct Structure {
 pub(super) enum StructureKind {
     /// IF, until its ELSE.
     If,
-    /// Behind ELSE.
+    /// After ELSE.
     Else,
     /// The condition stands at the head.
     While,

@@ -199,7 +199,7 @@ struct BehindIt {
     program: Until,
     /// Until the next return.
     label: Until,
-    /// Behind the last point.
+    /// After the last point.
     last: Option<u32>,
 }
 

@@ -392,7 +392,7 @@ impl Interpreter<'_, '_> {
     fn open_loop(&mut self, kind: StructureKind, block: &Block<'_>, name: Variable) {
         self.arrive(Site::Head(block.node));
         if kind == StructureKind::While {
-            self.depart(Site::Behind(block.node));
+            self.depart(Site::After(block.node));
         }
         self.open_structure(kind, block, name);
     }
@@ -402,8 +402,8 @@ impl Interpreter<'_, '_> {
         let Some(Structure { kind, block, .. }) = self.pass.structures.pop() else { return };
         self.depart(Site::Head(block));
         match kind {
-            StructureKind::Until => self.arrive(Site::Behind(block)),
-            _ => self.arrive_from_elsewhere(Site::Behind(block)),
+            StructureKind::Until => self.arrive(Site::After(block)),
+            _ => self.arrive_from_elsewhere(Site::After(block)),
         }
     }
 
@@ -415,7 +415,7 @@ impl Interpreter<'_, '_> {
         if !is_conditional {
             structure.kind = StructureKind::Else;
         }
-        self.depart(Site::Behind(block));
+        self.depart(Site::After(block));
         self.arrive_from_elsewhere(Site::Branch(block, branch));
         if is_conditional {
             self.depart(Site::Branch(block, branch + 1));
@@ -427,7 +427,7 @@ impl Interpreter<'_, '_> {
         if kind == StructureKind::If {
             self.arrive(Site::Branch(block, branch));
         }
-        self.arrive(Site::Behind(block));
+        self.arrive(Site::After(block));
     }
 
     /// O break, O continue (LinuxCNC). The condition of DO stands at its end.
@@ -448,7 +448,7 @@ impl Interpreter<'_, '_> {
             return self.join_unseen_predecessors();
         };
         if keyword == b"BREAK" || kind == Until {
-            self.depart(Site::Behind(block));
+            self.depart(Site::After(block));
         }
         if keyword == b"CONTINUE" {
             self.depart(Site::Head(block));

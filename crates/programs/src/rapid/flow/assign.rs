@@ -68,7 +68,7 @@ impl Interpreter<'_, '_, '_> {
     fn may_fail(&self, part: Child) -> bool {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let Child::Node(node) = part else { return false };
-        (node..tree.nodes.behind(node)).any(|node| {
+        (node..tree.nodes.subtree_end(node)).any(|node| {
             let name = tree.text(tree.nodes.first(node));
             tree.nodes.kind(node) == Syntax::Function
                 && self.evaluator.symbols.routine(self.unit.scope, name).is_some()

@@ -16,7 +16,7 @@ impl Interpreter<'_, '_, '_> {
     pub(super) fn invalidate_changed(&mut self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
-        for node in node..tree.nodes.behind(node) {
+        for node in node..tree.nodes.subtree_end(node) {
             let kind = tree.nodes.kind(node);
             if !kind.may_change() {
                 continue;

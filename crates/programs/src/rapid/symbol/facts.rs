@@ -65,7 +65,7 @@ impl Symbols {
     /// The facts of every unit.
     pub(super) fn collect_facts(&self, trees: &[RapidTree<'_>]) -> Vec<UnitFacts> {
         let facts = |&unit: &Unit| {
-            let nodes = unit.node + 1..trees[unit.file as usize].nodes.behind(unit.node);
+            let nodes = unit.node + 1..trees[unit.file as usize].nodes.subtree_end(unit.node);
             // The parts of a long routine in parallel; a fragment skips whole routines, so it stays in one piece.
             let parts =
                 if unit.routine.is_some() { nodes.len().div_ceil(PORTION as usize).max(1) } else { 1 };
@@ -91,7 +91,7 @@ impl Symbols {
         while node < nodes.end {
             let kind = tree.nodes.kind(node);
             if unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) {
-                node = tree.nodes.behind(node);
+                node = tree.nodes.subtree_end(node);
                 continue;
             }
             if kind == Syntax::Call && self.is_plain_motion(tree, unit.scope, node) {
@@ -197,14 +197,14 @@ impl Symbols {
             }
         };
         let mut clauses = tree.child_nodes(unit.node).filter(|&clause| is_resuming_handler(tree, clause));
-        clauses.any(|clause| (clause..tree.nodes.behind(clause)).any(moves))
+        clauses.any(|clause| (clause..tree.nodes.subtree_end(clause)).any(moves))
     }
 
     /// Whether an interrupt routine moves the robot without storing the path.
     pub(super) fn find_moving_interrupts(&self, trees: &[RapidTree<'_>]) -> bool {
         let stores_path = |unit: Unit| {
             let tree = &trees[unit.file as usize];
-            (unit.node..tree.nodes.behind(unit.node)).any(|node| {
+            (unit.node..tree.nodes.subtree_end(unit.node)).any(|node| {
                 let node = tree.nodes.get(node);
                 node.kind == Syntax::Call && same_name(tree.text(node.first), b"StorePath")
             })
@@ -255,7 +255,7 @@ pub(crate) fn is_resuming_handler(tree: &RapidTree<'_>, clause: u32) -> bool {
             _ => false,
         }
     };
-    let end = tree.nodes.behind(clause);
+    let end = tree.nodes.subtree_end(clause);
     tree.nodes.kind(clause) == Syntax::ErrorClause && (clause..end).any(resumes)
 }
 

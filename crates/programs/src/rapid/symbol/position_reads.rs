@@ -24,7 +24,7 @@ pub(super) fn position_decisions(trees: &[RapidTree<'_>]) -> BTreeSet<(u32, u32)
     for ((file, tree), found) in (0..).zip(trees).zip(found) {
         let mut add = |node: u32| {
             let first = found.partition_point(|read| *read < node);
-            let reads = found[first..].iter().take_while(|read| **read < tree.nodes.behind(node));
+            let reads = found[first..].iter().take_while(|read| **read < tree.nodes.subtree_end(node));
             out.extend(reads.map(|read| (file, *read)));
         };
         for node in 0..tree.nodes.len() {

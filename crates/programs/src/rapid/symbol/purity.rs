@@ -14,7 +14,7 @@ impl Symbols {
     /// unknown one.
     pub fn is_impure(&self, tree: &RapidTree<'_>, scope: u32, expression: Child) -> bool {
         let Child::Node(node) = expression else { return false };
-        (node..tree.nodes.behind(node)).any(|node| {
+        (node..tree.nodes.subtree_end(node)).any(|node| {
             tree.nodes.kind(node) == Syntax::Function
                 && match self.callees(scope, tree.text(tree.nodes.first(node))) {
                     callees @ [_, ..] => callees.iter().any(|routine| self.effects_of(*routine).impure),

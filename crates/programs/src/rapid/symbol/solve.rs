@@ -138,7 +138,7 @@ impl Symbols {
                 Some(firsts[routine as usize] + at)
             };
             let tree = &trees[unit.file as usize];
-            for node in unit.node + 1..tree.nodes.behind(unit.node) {
+            for node in unit.node + 1..tree.nodes.subtree_end(unit.node) {
                 let found = tree.nodes.get(node);
                 if !found.kind.may_change() {
                     continue;
@@ -185,7 +185,7 @@ impl Symbols {
             effects
         };
         let mut effects: Vec<SideEffects> = all.iter().zip(&self.units).map(own).collect();
-        // Behind the units a node for each list of routines that a computed name may call; what else such a call may do is a fact
+        // After the units a node for each list of routines that a computed name may call; what else such a call may do is a fact
         // of its caller.
         let lists = all.len() as u32;
         effects.resize(all.len() + self.late_lists.len(), SideEffects::default());
@@ -228,7 +228,7 @@ impl Symbols {
             }
             let tree = &trees[unit.file as usize];
             for clause in tree.child_nodes(unit.node).filter(|&clause| is_resuming_handler(tree, clause)) {
-                let end = tree.nodes.behind(clause);
+                let end = tree.nodes.subtree_end(clause);
                 let facts = self.facts_of(trees, *unit, clause + 1..end);
                 let writes = facts.writes.iter().map(|write| write.symbol).collect();
                 add(&SideEffects { writes, ..facts.effects });

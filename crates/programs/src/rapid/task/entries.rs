@@ -84,7 +84,7 @@ impl ListingBuilder<'_, '_> {
                 Some(_) => alone,
             });
         }
-        // Behind the units a node for each list of routines that a computed name may call, and one for unknown code.
+        // After the units a node for each list of routines that a computed name may call, and one for unknown code.
         let lists = units.len() as u32;
         let unknown = lists + symbols.late_lists.len() as u32;
         entries.resize(unknown as usize + 1, SwitchSet::EMPTY);

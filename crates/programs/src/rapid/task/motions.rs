@@ -161,9 +161,10 @@ impl ListingBuilder<'_, '_> {
         motion.instruction = self.name_of(known);
         motion.kind = instruction.kind;
         let count = arguments(tree, node).filter(|argument| !argument.optional).count();
-        let (mut index, mut work_object, mut has_tool) = (0, None, false);
+        let (mut index, mut work_object) = (0, None);
         let (mut velocity, mut time) = (None, None);
-        let (mut targets, mut to, mut via) = (0, false, instruction.kind != MotionKind::Circular);
+        let (mut targets, mut via) = (0, instruction.kind != MotionKind::Circular);
+        let (mut to, mut tool) = (None, None);
         let mut options = Options::default();
         for argument in arguments(tree, node) {
             if argument.optional {
@@ -186,7 +187,7 @@ impl ListingBuilder<'_, '_> {
                 Some(Slot::To) => {
                     let joints = instruction.takes_joints();
                     self.add_target(&mut motion, (unit, node, state), value, joints, (Role::To, targets));
-                    (targets, to) = (targets + 1, true);
+                    (targets, to) = (targets + 1, Some(value));
                 }
                 Some(Slot::Via) => {
                     self.add_target(&mut motion, (unit, node, state), value, false, (Role::Via, targets));
@@ -195,7 +196,7 @@ impl ListingBuilder<'_, '_> {
                 Some(Slot::Speed) => motion.speed = Some(self.speed(unit, state, value)),
                 Some(Slot::Zone) => motion.zone = Some(self.zone(unit, state, value)),
                 Some(Slot::Tool) => {
-                    has_tool = true;
+                    tool = Some(value);
                     motion.tool = Some(self.tool(unit, state, value));
                 }
                 _ => {}
@@ -215,14 +216,16 @@ impl ListingBuilder<'_, '_> {
         motion.can_straighten = free
             && instruction.kind == MotionKind::Circular
             && instruction.line_form().is_some_and(Instruction::splits);
-        if has_tool {
+        if tool.is_some() {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }
-        if motion.to().is_some_and(|to| to.value.is_err()) && self.follows_position(unit, node, instruction) {
+        if motion.to().is_some_and(|to| to.value.is_err())
+            && self.follows_position(unit, to, tool, work_object)
+        {
             let to = motion.targets.iter_mut().rev().find(|target| target.role == Role::To);
             to.into_iter().for_each(|to| to.value = Err(Reason::CurrentPosition));
         }
-        let complete = to && via && count >= instruction.least();
+        let complete = to.is_some() && via && count >= instruction.least();
         motion.own_reason =
             self.refusal(&motion, instruction, &options, complete).or_else(|| self.side_effect(&motion));
         motion
@@ -262,7 +265,7 @@ impl ListingBuilder<'_, '_> {
     /// Whether an argument calls a function of the program or an impure one: each inserted target would evaluate it again.
     fn has_impure_argument(&self, unit: Unit, node: u32) -> bool {
         let tree = &self.trees[unit.file as usize];
-        let nodes = node..tree.nodes.behind(node);
+        let nodes = node..tree.nodes.subtree_end(node);
         let mut functions = nodes.filter(|&node| tree.nodes.kind(node) == Syntax::Function);
         functions.any(|function| {
             let name = tree.text(tree.nodes.first(function));
@@ -272,24 +275,14 @@ impl ListingBuilder<'_, '_> {
 
     /// Whether the end of a motion is counted from where the robot stands, in the motion's own tool and work object: `CRobT`, perhaps
     /// with `Offs` or `RelTool`.
-    fn follows_position(&self, unit: Unit, node: u32, instruction: &Instruction) -> bool {
+    fn follows_position(
+        &self,
+        unit: Unit,
+        to: Option<Child>,
+        tool: Option<Child>,
+        work_object: Option<Child>,
+    ) -> bool {
         let tree = &self.trees[unit.file as usize];
-        let count = arguments(tree, node).filter(|argument| !argument.optional).count();
-        let (mut index, mut to, mut tool, mut work_object) = (0, None, None, None);
-        for argument in arguments(tree, node) {
-            match argument.name.map(|name| tree.text(name)) {
-                Some(name) if argument.optional && same_name(name, b"WObj") => work_object = argument.value,
-                _ if argument.optional => {}
-                name => {
-                    match name.map_or_else(|| instruction.slot(index, count), named_slot) {
-                        Some(Slot::To) => to = argument.value,
-                        Some(Slot::Tool) => tool = argument.value,
-                        _ => {}
-                    }
-                    index += 1;
-                }
-            }
-        }
         let function = |value: Option<Child>| match value {
             Some(Child::Node(node)) if tree.nodes.kind(node) == Syntax::Function => {
                 let name = tree.text(tree.nodes.first(node));
@@ -371,11 +364,6 @@ impl ListingBuilder<'_, '_> {
             }
         }
         if found.is_empty() {
-            let is_outside = !late && predefined::effect(name).is_none();
-            if is_outside && self.symbols.callees(unit.scope, name).is_empty() {
-                let place = self.place(unit.file, tree.nodes.first(node));
-                self.listing.outside_calls.push(OutsideCall { name: display(name), place });
-            }
             return None;
         }
         let mut motion = self.motion(unit, node, state, nesting);
@@ -394,6 +382,17 @@ impl ListingBuilder<'_, '_> {
             (false, None) => Reason::UnknownInstruction,
         });
         Some(motion)
+    }
+
+    /// Lists a call without targets if no file declares what it calls.
+    pub(super) fn record_outside_call(&mut self, unit: Unit, node: u32) {
+        let tree = &self.trees[unit.file as usize];
+        let name = tree.text(tree.nodes.first(node));
+        let is_outside = tree.nodes.kind(node) != Syntax::LateCall && predefined::effect(name).is_none();
+        if is_outside && self.symbols.callees(unit.scope, name).is_empty() {
+            let place = self.place(unit.file, tree.nodes.first(node));
+            self.listing.outside_calls.push(OutsideCall { name: display(name), place });
+        }
     }
 
     /// Whether an argument is a target by its type: `Some(true)` for a jointtarget.

@@ -34,7 +34,7 @@ pub(super) fn of(trees: &[RapidTree<'_>], symbols: &Symbols, mains: &[u32]) -> H
     let mut found: HashMap<u32, Arguments> = HashMap::new();
     for unit in &symbols.units {
         let tree = &trees[unit.file as usize];
-        let nodes = unit.node..tree.nodes.behind(unit.node);
+        let nodes = unit.node..tree.nodes.subtree_end(unit.node);
         for call in nodes.filter(|node| tree.nodes.kind(*node) == Syntax::Call) {
             let callees = symbols.callees(unit.scope, tree.text(tree.nodes.first(call)));
             for (callee, is_alone) in callees.iter().map(|callee| (*callee, callees.len() == 1)) {

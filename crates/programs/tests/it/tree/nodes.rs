@@ -47,7 +47,7 @@ impl Both {
         assert!(self.nodes.iter().eq(self.plain.iter().copied()));
         for (node, plain) in (0..).zip(&self.plain) {
             assert_eq!((self.nodes.kind(node), self.nodes.first(node)), (plain.kind, plain.first));
-            assert_eq!(self.nodes.behind(node), node + plain.size);
+            assert_eq!(self.nodes.subtree_end(node), node + plain.size);
         }
     }
 }
