@@ -5,7 +5,7 @@
 //!    until all remaining causes are significant.
 //! 2. *Stability selection.* In each half of [`halves`](super::halves) causes are selected again from scratch, by evidence and to
 //!    first order. A cause is recovered if it is selected there with the same joints, or if it raises the evidence there (it can be
-//!    too weak for selection) and no rival was selected in its place. The recovered interval of a shift must overlap by [`OVERLAP`].
+//!    too weak for selection) and no rival was selected in its place, or only rivals that explain less beside the others. The recovered interval of a shift must overlap by [`OVERLAP`].
 //! 3. *Invariance.* Its size in a half must not differ from that in all rows by more than chance and [`CHANGED`] allow.
 //!
 //! Source: Meinshausen and Bühlmann 2010 and Shah and Samworth 2013 (stability selection); Peters, Bühlmann and Meinshausen 2016
@@ -21,7 +21,7 @@ use super::candidates::Scored;
 use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::cause_kind::CauseKind;
-use super::design::{Design, FullDesign, Linear};
+use super::design::{Design, FullDesign, Linear, Projected};
 use super::discrepancy::{Discrepancy, Functions};
 use super::elimination::{Criteria, Eliminated, Significance, Tested, eliminate};
 use super::extension::{Extended, Subject};
@@ -383,7 +383,8 @@ impl<'a> Half<'a> {
     ) -> Vec<Option<(bool, bool)>> {
         let all: Vec<usize> = (0..own.len()).collect();
         let whole = self.linear.whole();
-        let selected = self.selected(own, pool, &whole.without(&self.confirming.parameter_indices(&all)));
+        let without_causes = whole.without(&self.confirming.parameter_indices(&all));
+        let selected = self.selected(own, pool, &without_causes);
         let columns: Vec<DMatrix<f64>> = own.iter().map(|tried| self.columns(&tried.columns)).collect();
         let projected = whole.design.project_all(&columns);
         own.iter()
@@ -407,13 +408,15 @@ impl<'a> Half<'a> {
                 let recovered = if cause.rows().is_some() {
                     self.recovers_shift(tried, &design, &score)
                 } else {
-                    let same = selected.iter().any(|s| s.is_same_finding(cause));
-                    let displaced = accepted.rivals.iter().any(|r| {
-                        let rival = &r.candidate.cause;
-                        selected.iter().any(|s| s.is_same_finding(rival))
-                            && !own.iter().any(|o| o.candidate.cause.is_same_finding(rival))
-                    });
-                    same || (score.evidence > 0.0 && !displaced)
+                    let is_of = |s: &WithColumns, cause: &Cause| s.candidate.cause.is_same_finding(cause);
+                    let same = selected.iter().any(|s| is_of(s, cause));
+                    let rivals = accepted.rivals.iter().map(|r| &r.candidate.cause);
+                    let foreign: Vec<&Cause> = rivals.filter(|r| !own.iter().any(|o| is_of(o, r))).collect();
+                    let (rivals, others): (Vec<&WithColumns>, Vec<&WithColumns>) =
+                        selected.iter().partition(|s| foreign.iter().any(|rival| is_of(s, rival)));
+                    let displaced =
+                        || !rivals.is_empty() && !self.beats(tried, &rivals, &others, &without_causes);
+                    same || (score.evidence > 0.0 && !displaced())
                 };
                 Some((recovered, changed))
             })
@@ -451,20 +454,20 @@ impl<'a> Half<'a> {
     }
 
     /// Forward selection from scratch, each step to first order; best first. `design` has none of the causes.
-    fn selected(&self, own: &[WithColumns], pool: &[WithColumns], design: &Design) -> Vec<Cause> {
+    fn selected<'c>(
+        &self,
+        own: &'c [WithColumns],
+        pool: &'c [WithColumns],
+        design: &Design,
+    ) -> Vec<&'c WithColumns> {
         let all: Vec<&WithColumns> = pool.iter().chain(own.iter().filter(|o| fresh(o, pool))).collect();
-        let columns: Vec<DMatrix<f64>> = all.iter().map(|t| self.columns(&t.columns)).collect();
-        let mut projected = design.project_all(&columns);
-        let mut products = PureProducts::of(design, &columns, &projected);
+        let mut left = Remaining::of(self, design, &all);
         let mut chosen: Vec<usize> = Vec::new();
         let options = self.confirming.options;
         while chosen.len() < own.len() + 4 {
             let mut scored: Vec<(usize, Score)> = (0..all.len())
                 .filter(|j| !chosen.contains(j))
-                .map(|j| {
-                    let candidate = &all[j].candidate;
-                    (j, score_projected(&projected[j], &candidate.cause.sizes(), candidate.tried))
-                })
+                .map(|j| (j, left.score(j)))
                 .filter(|(_, score)| score.merit > 0.0)
                 .collect();
             scored.sort_by(|a, b| b.1.merit.total_cmp(&a.1.merit).then(a.0.cmp(&b.0)));
@@ -476,21 +479,74 @@ impl<'a> Half<'a> {
             });
             let Some((j, _)) = best else { break };
             chosen.push(j);
-            // Projects the selected cause off all candidates.
-            let mut normal = projected[j].information.clone();
-            for (k, size) in all[j].candidate.cause.sizes().iter().enumerate() {
-                normal[(k, k)] += size.powi(-2);
-            }
-            let lower = lower_factor(normal);
-            let Some(pull) = lower.solve_lower_triangular(&projected[j].gradient) else { break };
-            let shared = products.project_off(j, &columns[j], &lower);
-            for (p, range) in projected.iter_mut().zip(&products.ranges) {
-                let t = shared.columns(range.start, range.len());
-                p.information -= t.transpose() * t;
-                p.gradient -= t.tr_mul(&pull);
+            if !left.project_off(j) {
+                break;
             }
         }
-        chosen.into_iter().map(|j| all[j].candidate.cause.clone()).collect()
+        chosen.into_iter().map(|j| all[j]).collect()
+    }
+
+    /// Whether a cause explains these rows better than all selected `rivals` together, given the `others` that are selected. Forward selection
+    /// begins with what explains most alone, and that can be a rival which explains parts of two causes.
+    fn beats(
+        &self,
+        own: &WithColumns,
+        rivals: &[&WithColumns],
+        others: &[&WithColumns],
+        design: &Design,
+    ) -> bool {
+        let all: Vec<&WithColumns> = others.iter().chain(&[own]).chain(rivals).copied().collect();
+        let mut left = Remaining::of(self, design, &all);
+        if !(0..others.len()).all(|j| left.project_off(j)) {
+            return false;
+        }
+        let own_merit = left.score(others.len()).merit;
+        let mut of_rivals = 0.0;
+        for j in others.len() + 1..all.len() {
+            of_rivals += left.score(j).merit;
+            left.project_off(j);
+        }
+        own_merit > of_rivals
+    }
+}
+
+/// Candidates in the rows of a half, with what is free and what was selected projected off.
+struct Remaining<'c> {
+    all: Vec<&'c WithColumns>,
+    columns: Vec<DMatrix<f64>>,
+    projected: Vec<Projected>,
+    products: PureProducts,
+}
+
+impl<'c> Remaining<'c> {
+    /// Nothing is selected yet.
+    fn of(half: &Half<'_>, design: &Design, all: &[&'c WithColumns]) -> Self {
+        let columns: Vec<DMatrix<f64>> = all.iter().map(|t| half.columns(&t.columns)).collect();
+        let projected = design.project_all(&columns);
+        let products = PureProducts::of(design, &columns, &projected);
+        Self { all: all.to_vec(), columns, projected, products }
+    }
+
+    fn score(&self, j: usize) -> Score {
+        let candidate = &self.all[j].candidate;
+        score_projected(&self.projected[j], &candidate.cause.sizes(), candidate.tried)
+    }
+
+    /// Projects a candidate, with its prior, off all; whether that is possible.
+    fn project_off(&mut self, j: usize) -> bool {
+        let mut normal = self.projected[j].information.clone();
+        for (k, size) in self.all[j].candidate.cause.sizes().iter().enumerate() {
+            normal[(k, k)] += size.powi(-2);
+        }
+        let lower = lower_factor(normal);
+        let Some(pull) = lower.solve_lower_triangular(&self.projected[j].gradient) else { return false };
+        let shared = self.products.project_off(j, &self.columns[j], &lower);
+        for (p, range) in self.projected.iter_mut().zip(&self.products.ranges) {
+            let t = shared.columns(range.start, range.len());
+            p.information -= t.transpose() * t;
+            p.gradient -= t.tr_mul(&pull);
+        }
+        true
     }
 }
 
