@@ -9,7 +9,7 @@ use truegrind::compensation::cell::template::{TemplateProgram, cell_template};
 use truegrind::programs::reading::Program;
 
 use super::exit_status::ExitStatus;
-use super::files::Batch;
+use super::files::{Batch, spare_filled_in};
 use super::inputs::{self, UrdfLinks};
 use super::programs::{self, Grouping, Programs};
 use super::terminal::print_message;
@@ -64,6 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         bail!("these programs contain no motion, so they use no tool and no work object");
     }
     let made = cell_template(&asking, robot.as_ref().map(|robot| robot.sheet.name.as_str()));
+    spare_filled_in(&arguments.output, &made.text)?;
     let mut batch =
         Batch::sparing(read.iter().flat_map(|programs| programs.files.iter().map(|(path, _)| path)));
     batch.add(&arguments.output, made.text);

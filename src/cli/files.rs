@@ -295,6 +295,24 @@ fn write_through(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     fs::OpenOptions::new().write(true).truncate(true).open(path)?.write_all(bytes)
 }
 
+/// Refuses to replace a form that somebody may have filled in: only an empty file, or one that holds just the `form`, is written again.
+///
+/// # Errors
+/// With the path, if the file holds something else.
+pub(super) fn spare_filled_in(path: &Path, form: &str) -> anyhow::Result<()> {
+    if is_stdout(path) || !path.is_file() {
+        return Ok(());
+    }
+    let there = fs::read(path).unwrap_or_default();
+    if there.trim_ascii().is_empty() || there == form.as_bytes() {
+        return Ok(());
+    }
+    bail!(
+        "{}: the file exists and holds more than the empty form: what was filled in would be lost; give -o another name, or delete the file",
+        path.display()
+    )
+}
+
 /// Creates a folder for outputs.
 pub(super) fn make_folder(path: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(path).with_context(|| format!("{}: folder cannot be created", path.display()))

@@ -7,7 +7,7 @@ use truegrind::calibration::measurement::dataset::Sensor;
 use truegrind::calibration::measurement::import::template;
 
 use super::exit_status::ExitStatus;
-use super::files::Batch;
+use super::files::{Batch, spare_filled_in};
 use super::inputs::{self, UrdfLinks};
 use super::terminal::print_message;
 
@@ -65,7 +65,9 @@ fn empty_table(arguments: &Template) -> anyhow::Result<ExitStatus> {
     let columns = template::columns(sensor);
     let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
     let mut batch = Batch::default();
-    batch.add(&arguments.output, names.join(",") + "\n");
+    let form = names.join(",") + "\n";
+    spare_filled_in(&arguments.output, &form)?;
+    batch.add(&arguments.output, form);
     batch.write()?;
     print_message(format_args!("fill in one row for each pose of {}:", robot.sheet.name));
     for (names, meaning) in template::meanings(&columns) {

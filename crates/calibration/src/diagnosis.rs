@@ -59,6 +59,7 @@ pub mod extension;
 pub mod design;
 mod link_geometry;
 mod link_growth;
+pub mod lump_direction;
 pub mod held_out;
 pub mod score;
 pub mod intervals;

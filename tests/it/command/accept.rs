@@ -301,4 +301,13 @@ fn an_empty_table_says_what_belongs_where() {
     assert!(code < 2 && out.contains("sensor cable"), "{out}{err}");
     let (code, _, err) = truegrind(at, &["measurement", "template", "--robot", "abb-irb-12"]);
     assert!(code == 2 && err.contains("abb-irb-120"), "{err}");
+    // A table that is filled in is not replaced by an empty one.
+    let again = ["measurement", "template", "--robot", "abb-irb-120", "--sensor", "cable", "-o", "full.csv"];
+    let filled = fs::read(at.join("full.csv")).unwrap();
+    let (code, _, err) = truegrind(at, &again);
+    assert!(code == 2 && err.contains("full.csv: the file exists"), "{err}");
+    assert_eq!(fs::read(at.join("full.csv")).unwrap(), filled);
+    let (code, _, err) =
+        truegrind(at, &again.map(|word| if word == "full.csv" { "cable.csv" } else { word }));
+    assert_eq!(code, 0, "{err}");
 }

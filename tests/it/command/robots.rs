@@ -202,3 +202,23 @@ fn what_is_exported_says_its_own_error() {
     let (code, _, err) = export("nominal", &["urdf", "-o", "-"]);
     assert!(code == 2 && err.contains("expected a model file"), "{err}");
 }
+
+/// The way to state that an arm of the catalogue hangs: its data sheet as a file, with another gravity.
+#[test]
+fn an_arm_of_the_catalogue_is_written_as_a_file() {
+    let dir = folder();
+    let at = dir.path();
+    let (code, _, err) = truegrind(at, &["robots", "abb-irb-120", "-o", "mine.toml"]);
+    assert_eq!(code, 0, "{err}");
+    let text = fs::read_to_string(at.join("mine.toml")).unwrap();
+    assert!(text.contains("[robot.mounting]") && text.contains("gravity = [0.0, 0.0, -1.0]"), "{text}");
+    let (_, sheet, _) = truegrind(at, &["robots", "abb-irb-120"]);
+    let (code, mine, err) = truegrind(at, &["robots", "mine.toml"]);
+    assert_eq!((code, mine), (0, sheet), "{err}");
+    let (code, _, err) = truegrind(at, &["robots", "abb-irb-120", "--html", "arm.html"]);
+    assert!(code == 2 && err.contains("--check FILE"), "{err}");
+    let (code, _, err) = truegrind(at, &["robots", "-o", "mine.toml"]);
+    assert!(code == 2 && err.contains("Give its name"), "{err}");
+    let (code, _, err) = truegrind(at, &["robots", "mine.toml", "-o", "mine.toml"]);
+    assert!(code == 2 && err.contains("mine.toml"), "{err}");
+}

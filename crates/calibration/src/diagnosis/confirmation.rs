@@ -28,6 +28,7 @@ use super::extension::{Extended, Subject};
 use super::halves::{HALVES, halves};
 use super::intervals::ShiftScan;
 use super::link_growth;
+use super::lump_direction;
 use super::pure_products::PureProducts;
 use super::score::{Score, score_columns, score_from, score_projected};
 use super::selection::{Accepted, Options, contains_cause};
@@ -54,6 +55,8 @@ pub(super) struct Confirmation {
     pub changed: usize,
     /// Whether its size is physically plausible, and no other finding explains the same rows.
     pub plausible: bool,
+    /// Whether it is a compliance by which loads would lift the arm, as one does that hangs and is taken for one that stands.
+    pub lifts: bool,
 }
 
 /// Number of halves in which a cause can fail and still be confirmed.
@@ -89,7 +92,13 @@ impl Confirmation {
     /// Why it is not confirmed.
     pub(super) fn doubts(&self) -> Vec<String> {
         let mut out = Vec::new();
-        if !self.plausible {
+        if self.lifts {
+            out.push(
+                "negative: weight would lift the arm. If it hangs upside down, write its robot file (`truegrind robots NAME -o ARM.toml`), set \
+                 gravity = [0.0, 0.0, 1.0] under [robot.mounting], and diagnose again with --robot ARM.toml"
+                    .to_owned(),
+            );
+        } else if !self.plausible {
             out.push("physically implausible size, or another finding explains the same rows".to_owned());
         }
         if !self.significant {
@@ -272,6 +281,19 @@ impl ConfirmationContext<'_> {
         sum * sum > CONFOUNDED * count * square
     }
 
+    /// Whether a deflection along horizontal axes, if it is one, is that of gravity in one direction.
+    fn is_one_direction(&self, index: usize) -> bool {
+        let (Cause::Arm(Effect::LumpedCompliance(load)), Some(covariance)) =
+            (&self.found.causes[index], &self.found.estimate.covariance)
+        else {
+            return true;
+        };
+        let own = self.found.parameter_indices(index);
+        let values: Vec<f64> = own.iter().map(|&k| self.found.x[k]).collect();
+        let covariance = covariance.select_rows(&own).select_columns(&own);
+        lump_direction::is_one_direction(load, &values, &covariance)
+    }
+
     fn parameter_indices(&self, causes: &[usize]) -> Vec<usize> {
         causes.iter().flat_map(|&k| self.found.parameter_indices(k)).collect()
     }
@@ -295,6 +317,14 @@ impl ConfirmationContext<'_> {
             })
             .collect();
         removed.iter().for_each(|&k| out[k].significant = false);
+        // A tilt that only joint 1 shows, which bears no weight in an upright arm, or that other joints contradict.
+        let causes = &self.found.causes;
+        let is_supported =
+            (0..out.len()).any(|k| causes[k].is_tilt() && !causes[k].requires_tilt() && out[k].plausible);
+        if !is_supported {
+            let alone = (0..out.len()).filter(|&k| causes[k].requires_tilt());
+            alone.for_each(|k| out[k].plausible = false);
+        }
         out
     }
 
@@ -338,7 +368,10 @@ impl ConfirmationContext<'_> {
             testable: 0,
             changed: 0,
             plausible: own.candidate.cause.has_plausible_sign()
+                && self.is_one_direction(index)
                 && !self.is_confounded_with_lag(&own.candidate.cause),
+            lifts: matches!(&own.candidate.cause, Cause::Arm(Effect::JointCompliance(_)))
+                && !own.candidate.cause.has_plausible_sign(),
         }
     }
 }

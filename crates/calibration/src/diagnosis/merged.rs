@@ -81,10 +81,11 @@ pub(super) fn merge_findings(
 ) -> Vec<MergedFinding> {
     let contributions = confounding.contributions;
     for merged in &mut findings {
-        // A finding is confirmed with any of its causes.
-        if !merged.causes.iter().any(|&k| confirmations[k].is_confirmed()) {
+        // A finding is confirmed with any of its causes, but bears the name of the first.
+        let first = merged.causes.first();
+        let is_implausible = first.is_some_and(|&k| !confirmations[k].plausible);
+        if is_implausible || !merged.causes.iter().any(|&k| confirmations[k].is_confirmed()) {
             merged.finding.confidence = Confidence::Ambiguous;
-            let first = merged.causes.first();
             merged.finding.doubts.extend(first.map(|&k| confirmations[k].doubts()).unwrap_or_default());
         }
         merged.finding.worth_mm = Some(contributions.unique_rms_mm(&merged.causes));

@@ -345,6 +345,40 @@ fn a_slow_drift_is_stated_as_far_as_it_was_seen() {
     assert!(!first.cause.contains("time constant"), "{}", first.cause);
 }
 
+/// A compliance and a gear that are both strong: begun from nothing, the selection in a half takes a rival of the compliance first, since that
+/// explains some of the gear too.
+#[test]
+fn a_second_strong_cause_does_not_cost_the_first_its_name() {
+    let ur10 = robots::load("universal-robots-ur10").unwrap().model;
+    let frames = |dataset: &Dataset| frames(dataset, &ur10);
+    for seed in [91, 92] {
+        let hidden = [
+            Hidden::Compliance { joint: 1, peak_rad: 2.0e-3 },
+            Hidden::Gear { joint: 0, order: 1.0, peak_rad: 3.5e-4, phase: 0.6 },
+        ];
+        let setup = Setup { sigma_mm: 0.02, dirty: false, ..setup(Sensor::Position, 160, seed) };
+        let dataset = run(&ur10, &hidden, &setup).dataset;
+        let start = frames(&dataset);
+        let found =
+            diagnose(&dataset, "universal-robots-ur10", &ur10, &start, &Options::default(), &|_| {}).unwrap();
+        let mut names: Vec<(&str, Option<&[usize]>)> =
+            identified(&found).iter().map(|f| (f.effect.as_str(), f.joints.as_deref())).collect();
+        names.sort_unstable();
+        let truth = [("gear-eccentricity", Some(&[1][..])), ("joint-compliance", Some(&[2][..]))];
+        assert_eq!(names, truth, "seed {seed}: {:?}", found.diagnosis.findings);
+    }
+}
+
+/// Weight that lifts: the arm hangs. It is no cause to write, and the doubt says how to state it.
+#[test]
+fn an_arm_that_hangs_is_told_how_to_be_stated() {
+    let hidden = [Hidden::Compliance { joint: 1, peak_rad: -1.0e-3 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 300, 93)).dataset);
+    let lifted = found.diagnosis.findings.iter().find(|f| f.effect == "joint-compliance").unwrap();
+    assert_eq!(lifted.confidence, Confidence::Ambiguous);
+    assert!(lifted.doubts.iter().any(|doubt| doubt.contains("[robot.mounting]")), "{:?}", lifted.doubts);
+}
+
 /// A slender link turns what it carries, and its first axis, by torques of both: two compliant joints cannot imitate that. The written arm
 /// contains it.
 #[test]

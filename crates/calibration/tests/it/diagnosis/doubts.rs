@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -18,6 +18,7 @@ use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::extension::{Extended, Freedom, Subject, fit};
 use truegrind_calibration::diagnosis::finding::Confidence;
+use truegrind_calibration::diagnosis::lump_direction::is_one_direction;
 use truegrind_calibration::diagnosis::preparation::prepare;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
@@ -176,4 +177,25 @@ fn an_error_of_two_joints_that_goes_with_the_weight_may_be_a_spring() {
     assert!(!of_two_joints(2, 1, [3e-4, 1e-4, 3e-4, 0.0]).follows_gravity_angle(&arm));
     assert!(!of_two_joints(2, 3, [3e-4, 1e-4, 0.0, 0.0]).follows_gravity_angle(&arm), "axes that cross");
     assert!(!of_two_joints(4, 1, [3e-4, 1e-4, 0.0, 0.0]).follows_gravity_angle(&arm), "no neighbours");
+}
+
+/// Gravity has one direction and masses are positive: deflections that point elsewhere are no tilt of the mounting.
+#[test]
+fn a_tilt_has_one_direction_for_all_lumps() {
+    let lump = |frame, axis| Lump { frame, axis: Some(axis), moment: None, factor: 0.0 };
+    let load = LumpedCompliance {
+        joint: 1,
+        lump: [2, 4, 6].iter().flat_map(|&f| [lump(f, 0), lump(f, 1)]).collect(),
+    };
+    let covariance = DMatrix::from_diagonal_element(6, 6, 1e-12);
+    let one = |values: [f64; 6]| is_one_direction(&load, &values, &covariance);
+    // Along (0.6, 0.8), with masses of 2, 3 and 1, and noise of a standard deviation.
+    assert!(one([1.2e-5, 1.6e-5, 1.8e-5, 2.4e-5, 0.6e-5, 0.8e-5]));
+    assert!(one([1.3e-5, 1.5e-5, 1.9e-5, 2.3e-5, 0.5e-5, 0.9e-5]));
+    // The second points the other way, or across.
+    assert!(!one([1.2e-5, 1.6e-5, -1.8e-5, -2.4e-5, 0.6e-5, 0.8e-5]));
+    assert!(!one([1.2e-5, 1.6e-5, -2.4e-5, 1.8e-5, 0.6e-5, 0.8e-5]));
+    // Too little is known to say so.
+    let wide = DMatrix::from_diagonal_element(6, 6, 1e-9);
+    assert!(is_one_direction(&load, &[1.2e-5, 1.6e-5, -2.4e-5, 1.8e-5, 0.6e-5, 0.8e-5], &wide));
 }
