@@ -2,7 +2,7 @@
 # What every verb writes, as digests: a change that is meant to change no result must leave them alone.
 #
 #   tests/freeze.sh BINARY            compare with tests/freeze/*.sha256; exit code 1 where anything differs
-#   tests/freeze.sh BINARY --update   write them anew; the commit says what changed and why
+#   tests/freeze.sh BINARY --update   write them again; the commit says what changed and why
 #
 # Compare on a processor with AVX-512: elsewhere fits end in other last digits.
 #

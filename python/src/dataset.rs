@@ -153,7 +153,7 @@ impl PyDataset {
     }
 
     /// Rows from arrays: logged controller angles (°) of shape (N, 6), and the readings of one sensor: ``length_mm`` (N,) of a
-    /// cable, ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. Optional: Cartesian readout of the
+    /// cable, ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. Optional: Cartesian read-out of the
     /// controller ``readout_mm`` (N, 3), ``time_h``, ``temperature_c`` and ``payload_kg`` (N,), approach directions (N, 6) in
     /// −1, 0, 1, number of the cable outlet ``anchor`` (N,), labels ``session`` and
     /// ``station``, where tracker or camera stood. NaN means unknown.

@@ -63,8 +63,7 @@ pub(crate) struct Refusal {
 }
 
 /// Command line options and the corresponding keywords.
-const KEYWORDS: [(&str, &str); 13] = [
-    ("--allow-odd-units takes the file at its word", "allow_odd_units=True takes the rows at their word"),
+const KEYWORDS: [(&str, &str); 12] = [
     ("--allow-odd-units", "allow_odd_units=True"),
     ("--allow-doubtful", "allow_doubtful=True"),
     ("--angles dh", "angles=\"dh\""),
@@ -218,19 +217,19 @@ impl From<Mismatch> for Refusal {
         let told = Self::new(Kind::Dataset, &error);
         match error {
             Mismatch::Units(suspicion) => {
-                let message = format!("{} (allow_odd_units=True takes the rows at their word)", told.message);
+                let message = format!("{} (allow_odd_units=True accepts the rows anyway)", told.message);
                 let differences = suspicion.differences();
                 let found: Vec<&str> = differences.iter().map(|(found, _)| *found).collect();
                 let expected = "degrees, millimetres and unit quaternions, scalar first";
                 told.saying(message).of_file(&suspicion.file).with(found.join("; "), expected)
             }
             Mismatch::Condition(_) => {
-                let message = format!("{} (allow_odd_units=True takes the rows at their word)", told.message);
+                let message = format!("{} (allow_odd_units=True accepts the rows anyway)", told.message);
                 told.saying(message)
             }
             Mismatch::Station(StationError { file, rows, .. }) => told
                 .of_file(&file)
-                .with(format!("{rows} rows"), "at least four poses from each station, not on a line"),
+                .with(format!("{rows} rows"), "at least four poses from each station, not on one line"),
             _ => told,
         }
     }
@@ -238,7 +237,7 @@ impl From<Mismatch> for Refusal {
 
 impl From<PayloadSuspicion> for Refusal {
     fn from(suspicion: PayloadSuspicion) -> Self {
-        let message = format!("{suspicion} (allow_odd_units=True takes the rows at their word)");
+        let message = format!("{suspicion} (allow_odd_units=True accepts the rows anyway)");
         Self::new(Kind::Dataset, &message).of_file(&suspicion.file)
     }
 }
@@ -400,7 +399,7 @@ impl From<TrackError> for Refusal {
                 told.of_file(&file).with(format!("{found} poses"), format!("{asked} poses"))
             }
             TrackError::Foreign { file, left_mm, held_out_mm, .. } => {
-                told.of_file(&file).with(format!("{left_mm:.3} mm"), format!("some {held_out_mm:.3} mm"))
+                told.of_file(&file).with(format!("{left_mm:.3} mm"), format!("about {held_out_mm:.3} mm"))
             }
             TrackError::Sensor { file, found, expected } => told.of_file(&file).with(found, expected),
             TrackError::State { file, .. } => told.of_file(&file),

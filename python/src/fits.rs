@@ -117,7 +117,7 @@ impl PyIdentification {
 
 /// Fits an arm to measured poses. ``robot``: a Robot, a name from ``truegrind.robots()`` or a robot file. ``held_out``: share of rows
 /// held out to estimate the error. Tolerances (mm, °): prior σ of the links. ``sensor_scale_sigma_percent``: standard uncertainty of the
-/// sensor's scale (%); by default a fault of the scale is taken for possible. ``angles``: ``"logged"`` or ``"dh"``, by default that of
+/// sensor's scale (%); by default a fault of the scale is considered possible. ``angles``: ``"logged"`` or ``"dh"``, by default that of
 /// the robot file. ``progress`` is called with each step. The result does not depend on the number of threads.
 #[pyfunction]
 #[pyo3(

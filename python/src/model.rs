@@ -69,7 +69,7 @@ impl PyModel {
             .map_err(|error| Refusal::new(Kind::Model, format!("{name}: {error}")).of_file(name))?;
         if arm.verdict.status == Judgement::Fail {
             let why = arm.verdict.reasons.join("; ");
-            let message = format!("{name}: the fit behind this model failed ({why}); it is not used");
+            let message = format!("{name}: this model cannot be used, since its fit failed: {why}");
             return Err(Refusal::new(Kind::Model, message).of_file(name));
         }
         Ok(Self {
@@ -91,7 +91,7 @@ impl PyModel {
         match verdict.status {
             Judgement::Fail => {
                 let message =
-                    format!("{}: the fit behind this model failed ({}); it is not used", self.name, why());
+                    format!("{}: this model cannot be used, since its fit failed: {}", self.name, why());
                 Err(Refusal::new(Kind::Model, message))
             }
             Judgement::Doubtful if !allow_doubtful => Err(Refusal::new(

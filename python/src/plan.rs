@@ -136,7 +136,7 @@ pub(crate) fn plan_(
         }
     };
     if !(4..=2000).contains(&poses) {
-        return Err(Refusal::argument("poses", poses, "4 to 2000; some 50 to 100 are usual").into());
+        return Err(Refusal::argument("poses", poses, "4 to 2000; about 50 to 100 are usual").into());
     }
     if candidates > 100_000 {
         return Err(Refusal::argument("candidates", candidates, "at most 100000; 2000 are usual").into());

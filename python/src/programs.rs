@@ -195,8 +195,7 @@ fn marked(listing: &Listing, sources: &Sources, hash: &str, again: bool) -> Resu
             *marked = true;
         } else if !again {
             let message = format!(
-                "{name}: already compensated with another model ({}): take the original program, or say again=True, with which \
-                 the corrections add up",
+                "{name}: already compensated with another model ({}): use the original program, or again=True to add this correction to that one",
                 mark.model
             );
             let told = Refusal::new(Kind::Program, message).of_file(name);
@@ -469,19 +468,20 @@ fn unreachable(found: &UnreachableMotions, name: &str, arm: &Estimated, model: &
     let motions = found.count;
     if let Some((_, error)) = found.example.as_ref().filter(|_| 2 * found.other_configuration > motions) {
         let message = format!(
-            "{name}: {} of the motions are in reach of {} only in other configurations than the program states ({error})",
+            "{name}: {} of the motions are in reach of {} only in other configurations than the program states ({error}): correct the \
+             configuration data, or use the model of the robot that runs it",
             found.other_configuration, arm.robot
         );
         let told = Refusal::new(Kind::Program, message).of_file(name);
         return told.with(error.to_string(), "the configurations of this robot");
     }
     let message = format!(
-        "{name}: {motions} motions and hardly one in reach of {} ({model}): the program is another robot's, or its tool and work \
-         object are not where it is told (cell); give the model of the robot that runs it",
+        "{name}: hardly any of the {motions} motions is in reach of {} ({model}): the program belongs to another robot, or its tool and work \
+         object are somewhere else (cell=); use the model of the robot that runs it",
         arm.robot
     );
     let told = Refusal::new(Kind::Program, message).of_file(name);
-    told.with(format!("{motions} motions and hardly one in reach"), "a program of this robot")
+    told.with(format!("hardly any of {motions} motions in reach"), "a program of this robot")
 }
 
 /// Refuses a cell or a program of another robot.

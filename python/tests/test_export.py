@@ -85,11 +85,11 @@ def test_a_urdf_is_the_arm_to_another_reader(run, tmp_path, robot):
 
 
 def test_joints_that_are_sums_are_as_the_file_says(run, tmp_path):
-    """A FANUC counts its forearm against the ground, a URDF cannot: the note says what its third angle is."""
+    """A FANUC measures its forearm relative to the ground, a URDF cannot: the note says what its third angle is."""
     robot = "fanuc-m-20ia"
     model = tg.identify(simulated(tmp_path, robot), robot).model
     text = exported(run, tmp_path, model, "urdf")
-    assert "works them out: joint 3 = J2 + J3;" in text
+    assert "must compute them: joint 3 = J2 + J3;" in text
     q_deg = poses()
     place, rotation = Urdf(text).forward(np.radians(q_deg + q_deg[:, 1:2] * np.eye(6)[2]))
     ours = model.forward(q_deg)

@@ -113,7 +113,7 @@ class Dataset:
     def from_numpy(q_deg: ArrayLike, *, length_mm: ArrayLike | None = None, position_mm: ArrayLike | None = None, quaternion_wxyz: ArrayLike | None = None, readout_mm: ArrayLike | None = None, time_h: ArrayLike | None = None, temperature_c: ArrayLike | None = None, payload_kg: ArrayLike | None = None, approach: ArrayLike | None = None, anchor: ArrayLike | None = None, session: SupportsGetItem[int, str | None] | None = None, station: SupportsGetItem[int, str | None] | None = None, name: str = "numpy", allow_odd_units: bool = False) -> Dataset:
         """
         Rows from arrays: logged controller angles (°) of shape (N, 6), and the readings of one sensor: ``length_mm`` (N,) of a
-        cable, ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. Optional: Cartesian readout of the
+        cable, ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. Optional: Cartesian read-out of the
         controller ``readout_mm`` (N, 3), ``time_h``, ``temperature_c`` and ``payload_kg`` (N,), approach directions (N, 6) in
         −1, 0, 1, number of the cable outlet ``anchor`` (N,), labels ``session`` and
         ``station``, where tracker or camera stood. NaN means unknown.
@@ -588,7 +588,7 @@ def identify(dataset: Dataset, robot: Robot | str | PathLike[str], *, method: st
     """
     Fits an arm to measured poses. ``robot``: a Robot, a name from ``truegrind.robots()`` or a robot file. ``held_out``: share of rows
     held out to estimate the error. Tolerances (mm, °): prior σ of the links. ``sensor_scale_sigma_percent``: standard uncertainty of the
-    sensor's scale (%); by default a fault of the scale is taken for possible. ``angles``: ``"logged"`` or ``"dh"``, by default that of
+    sensor's scale (%); by default a fault of the scale is considered possible. ``angles``: ``"logged"`` or ``"dh"``, by default that of
     the robot file. ``progress`` is called with each step. The result does not depend on the number of threads.
     """
 

@@ -46,7 +46,7 @@ pub(super) struct Arguments {
     /// Original program, which defines the intended path; PROGRAM is then its corrected version.
     #[arg(long, value_name = "ORIGINAL")]
     intended: Vec<PathBuf>,
-    /// Largest deviation of the corrected path from the intended one between two targets (mm); give the value that `compensate` had.
+    /// Largest deviation of the corrected path from the intended one between two targets (mm); use the value that was given to `compensate`.
     #[arg(long, value_name = "MM", default_value_t = 0.05, allow_negative_numbers = true)]
     tolerance: f64,
     /// Simulated actual arm (from `simulate --arm`) that runs the programs.
@@ -411,7 +411,7 @@ fn refuse_other_original(name: &str, task: &Listing, original: Option<&Listing>)
     Ok(())
 }
 
-/// Reasons that are told of a program without a point.
+/// Reasons that are reported of a program without a point.
 const MAX_REASONS: usize = 4;
 
 /// Why no motion of a program has a deviation: the most frequent reasons, each with its first line.

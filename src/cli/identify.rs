@@ -138,7 +138,7 @@ impl DataArguments {
 /// Options of a fit, of geometry alone or with causes.
 #[derive(Debug, Clone, Args)]
 pub(super) struct FitArguments {
-    /// Do not use the Cartesian readout of the controller to refine rounded joint angles.
+    /// Do not use the Cartesian read-out of the controller to refine rounded joint angles.
     #[arg(long)]
     pub(super) raw_columns: bool,
     /// Largest held-out RMSE with which the fit passes (mm).
@@ -153,8 +153,8 @@ pub(super) struct FitArguments {
     /// Manufacturing tolerance of link angles and joint offsets (°), used as prior σ.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tolerance_angle: Option<f64>,
-    /// Standard uncertainty of the sensor's scale (%), such as 0.001 for a tracker whose scale bar was met. Default: an error of 0.1 to 1 %
-    /// is taken for possible in a fifth of the cases.
+    /// Standard uncertainty of the sensor's scale (%), such as 0.001 for a tracker that agreed with a scale bar. Default: a scale error of
+    /// 0.1 to 1 % (1σ) has a prior probability of one in five.
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     sensor_scale_sigma: Option<f64>,
 }
@@ -388,8 +388,8 @@ fn note_payloads(dataset: &mut Dataset, robot: &Robot) {
     let most_kg = loads_kg().reduce(f64::max);
     if robot.model.bodies.is_none() && most_kg != loads_kg().reduce(f64::min) {
         dataset.notes.push(format!(
-            "column payload: {} has no masses here, and deflections follow a load only beside them, so the loads are not used; measure each load \
-             alone, or state the masses in a robot file",
+            "column payload: no masses are known for {}, and without them a deflection cannot follow the load, so the loads are not used; measure \
+             each load in a file of its own, or state the masses in a robot file",
             robot.sheet.name
         ));
     }

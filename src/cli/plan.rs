@@ -71,7 +71,7 @@ pub(super) struct Arguments {
     /// Diagnosis (from `diagnose --json`): prefer poses that distinguish the causes it left ambiguous or untested.
     #[arg(long = "for", value_name = "DIAGNOSIS.json")]
     diagnosis: Option<PathBuf>,
-    /// Plan only for the finding with this number, as the diagnosis counts them; for an unexplained error: the poses that tell most about
+    /// Plan only for the finding with this number, as in the diagnosis; for an unexplained error: the poses that show most about
     /// it.
     #[arg(long, value_name = "N", requires = "diagnosis")]
     finding: Option<usize>,
@@ -249,10 +249,10 @@ fn check_numbers(arguments: &Arguments, sigma: f64, usual_poses: usize) -> anyho
     }
     let poses = arguments.poses.unwrap_or(usual_poses);
     if poses < 4 {
-        bail!("--poses {poses}: expected at least 4; some 50 to 100 are usual");
+        bail!("--poses {poses}: expected at least 4; about 50 to 100 are usual");
     }
     if poses > MAX_POSES {
-        bail!("--poses {poses}: expected at most {MAX_POSES}; some 50 to 100 are usual");
+        bail!("--poses {poses}: expected at most {MAX_POSES}; about 50 to 100 are usual");
     }
     for (name, count) in [
         ("--repeats", arguments.repeats),

@@ -28,8 +28,8 @@ pub(super) struct StatedFrameArguments {
     /// Zero offset of a cable: reading minus free length (mm). Once per cable.
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     cable_zero: Vec<String>,
-    /// Measured point (hook, reflector, target) on the flange: x,y,z (mm) or x,y,z,qw,qx,qy,qz. Alone it is where a fit begins, and where
-    /// the point stays if the poses do not show it (one orientation of the flange). Default: the flange.
+    /// Measured point (hook, reflector, target) on the flange: x,y,z (mm) or x,y,z,qw,qx,qy,qz. Given alone, it is the starting value of
+    /// the fit, and the value that is kept if the poses do not determine it (one orientation of the flange). Default: the flange.
     #[arg(long, value_name = "X,Y,Z[,Q…]", allow_hyphen_values = true)]
     touched_point: Option<String>,
 }

@@ -166,7 +166,7 @@ impl TrackContext<'_> {
             print_message_once(
                 printed,
                 format!(
-                    "note: {} holds the rows to which the model was fitted: they locate the sensor, but count twice, and the standard \
+                    "note: {} contains the rows to which the model was fitted: they locate the sensor, but are used twice, and the standard \
                      deviations become too small by a quarter or more; track new measurements",
                     of_the_fit.file
                 ),
@@ -229,7 +229,7 @@ impl TrackContext<'_> {
         for dataset in datasets {
             if let Some(other) = tracker.copy_of(dataset) {
                 let (file, other) = (&dataset.file, other.to_owned());
-                let note = format!("note: {file} holds the same rows as {other}: they count once");
+                let note = format!("note: {file} contains the same rows as {other}: they are used once");
                 print_message_once(printed, note);
                 continue;
             }

@@ -456,7 +456,7 @@ fn what_is_left_shows_everywhere() {
     assert_eq!(code, 0, "{err}");
 }
 
-/// A program beside the original that it was made from: what someone changed afterwards is told by line, and no run of it is ok.
+/// A program beside the original that it was made from: what someone changed afterwards is listed by line, and no run of it is ok.
 #[test]
 fn a_program_that_was_edited_after_its_correction_is_not_ok() {
     let dir = workshop();

@@ -162,7 +162,7 @@ pub struct Acceptance {
 }
 
 impl Acceptance {
-    /// Whether the data sheet is nearer to the readings than the model, by more than the sensor's uncertainty: then the model is of another
+    /// Whether the data sheet fits the readings better than the model, by more than the sensor's uncertainty: then the model is of another
     /// arm, or the arm has changed.
     pub fn is_worse_than_data_sheet(&self) -> bool {
         let further_mm = (self.model.rmse.powi(2) - self.nominal.rmse.powi(2)).max(0.0).sqrt();

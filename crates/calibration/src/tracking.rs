@@ -28,7 +28,7 @@
 //! **Wrong arm.** First poses with residuals far above the model's held-out error are refused, and an arm that has changed before them
 //! is not taken for noise (`first_noise`): a filter that did would never detect a change.
 //!
-//! **Noise.** What the model left over is counted as noise. If the first poses scatter several times less, their own scatter is (`tracking/noise`).
+//! **Noise.** The residual of the model is taken as noise. If the first poses scatter several times less, their own scatter is used (`tracking/noise`).
 //!
 //! **Slow changes.** A drift may stay below every bound, since the filter follows it. What counts for programs is the whole way from the
 //! model that they were corrected with: the [`Departure`], which is judged at the end of every run. A [`Turn`] about axis 1 that the sensor saw is part of

@@ -131,7 +131,7 @@ pub fn compensate_prepared(
 }
 
 /// Air moves of an NC program next to a cut that stays uncorrected (before it, or after the last cut of the file): correcting them would
-/// move its start, and the axes that its blocks omit.
+/// move its start, and the values of the axes that its blocks omit.
 fn air_moves_alone(listing: &Listing, planned: &Plan) -> Vec<u32> {
     if !listing.numbered {
         return Vec::new();

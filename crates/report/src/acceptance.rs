@@ -97,7 +97,7 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
                 .to_owned(),
         ),
         Uncertainty::AboveStated => reasons.push(format!(
-            "repeated poses scatter more than the stated uncertainty of {} mm allows: twice their scatter, {} mm, counts instead",
+            "repeated poses scatter more than the stated uncertainty of {} mm allows: twice their scatter, {} mm, is used instead",
             length(found.stated_mm.unwrap_or_default()),
             length(found.uncertainty_mm)
         )),
@@ -121,13 +121,13 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
     }
     if found.model.rmse > OTHER_ARM_MM {
         reasons.push(
-            "no calibrated arm is so far off: check that these readings are of this arm, and their units"
+            "a calibrated arm does not have errors this large: check the units, and that these readings are of this arm"
                 .to_owned(),
         );
     }
     if found.is_worse_than_data_sheet() {
         reasons.push(format!(
-            "the data sheet is nearer to these readings than the model ({:.3} against {:.3} mm RMS): the model is of another arm, or the arm \
+            "the data sheet fits these readings better than the model does ({:.3} against {:.3} mm RMS): the model is of another arm, or the arm \
              has changed since it was measured",
             found.nominal.rmse, found.model.rmse
         ));
@@ -164,8 +164,8 @@ fn uncounted(left: Uncounted) -> String {
         stations => format!(", all those of {stations} of the {of_stations} stations among them"),
     };
     format!(
-        "{rows} rows do not count{whole}: their stations have too few poses, so that the frame of the station follows an error there; measure \
-         at least 10 poses from each station"
+        "{rows} rows do not count{whole}: their stations have so few poses that the fitted frame of the station absorbs an error of the arm; \
+         measure at least 10 poses from each station"
     )
 }
 
@@ -174,8 +174,8 @@ fn tested(found: &Acceptance) -> String {
     let tested = &found.tested;
     let [x, y, z] = tested.volume_mm;
     let volume = format!(
-        "tested: a volume of {x:.0} × {y:.0} × {z:.0} mm; errors of the links show in its poses {:.0} % as much as in those of the \
-         fit, placement excluded",
+        "tested: a volume of {x:.0} × {y:.0} × {z:.0} mm; errors of the links show {:.0} % as strongly in these poses as in the poses of the fit, \
+         placement excluded",
         100.0 * tested.share
     );
     if tested.is_enough() {
@@ -279,7 +279,7 @@ fn orientation_reason(found: &Acceptance) -> Option<String> {
     match turns.uncertainty {
         Uncertainty::Stated => None,
         Uncertainty::AboveStated => Some(format!(
-            "repeated poses scatter more than the stated orientation uncertainty allows: twice their scatter, {:.4}°, counts instead",
+            "repeated poses scatter more than the stated orientation uncertainty allows: twice their scatter, {:.4}°, is used instead",
             turns.uncertainty_rad.to_degrees()
         )),
         Uncertainty::Repeats => Some(
@@ -528,8 +528,8 @@ fn method(found: &Acceptance, statement: &Statement) -> Vec<String> {
     let mut method = vec![frames, rule];
     if !found.paths.is_empty() {
         method.push(
-            "Rows measured on a path count only for path accuracy and repeatability, in planes normal to the path at each sampling \
-             point. The commanded path is the path of the model at the logged joints."
+            "Rows measured on a path are used only for path accuracy and repeatability, in planes normal to the path at each sampling point. The \
+             commanded path is the path of the model at the logged joints."
                 .to_owned(),
         );
     }

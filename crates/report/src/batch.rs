@@ -446,7 +446,7 @@ fn verdict(rows: &[Row]) -> Verdict {
             format!("All programs were processed; {may_run} of {} {are} corrected and may run", rows.len())
         }
         Status::Warning if !open.is_any() => {
-            "All programs were processed, but what they make on one workpiece shifts against each other"
+            "All programs were processed, but the features that they make on one workpiece shift relative to each other"
                 .to_owned()
         }
         Status::Warning | Status::Found => {
@@ -501,7 +501,7 @@ fn sorted_names<'n>(names: impl Iterator<Item = &'n str>) -> Vec<String> {
 }
 
 /// Makes corrected programs doubtful whose routines another program of the run calls: they were read as if a displacement, a load or a tool
-/// of the caller did not hold there. Whether there are any.
+/// of the caller were not in force there. Whether there are any.
 pub fn doubt_called(rows: &mut [Row]) -> bool {
     let mut callers: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (index, row) in rows.iter().enumerate() {
@@ -520,7 +520,8 @@ pub fn doubt_called(rows: &mut [Row]) -> bool {
         let Some((name, caller)) = called.min_by_key(|(_, caller)| *caller) else { continue };
         let caller = caller.rsplit(['/', '\\']).next().unwrap_or(caller);
         row.doubt = Some(format!(
-            "{caller} calls {name}: what holds there (displacement, load, tools) was not read. Give the modules of one task together (--together)"
+            "{caller} calls {name}: the displacement, load and tools in force at that call are unknown. Give the modules of one task together \
+             (--together)"
         ));
         found = true;
     }
@@ -549,7 +550,7 @@ fn shape_alone(rows: &[Row]) -> Option<String> {
     })
 }
 
-/// Whether parts of one workpiece shift against each other, since some programs keep their placement and others correct it.
+/// Whether features of one workpiece shift relative to each other, since some programs keep their placement and others correct it.
 pub fn shifts_apart(rows: &[Row]) -> bool {
     !placed_apart(rows).is_empty()
 }
@@ -575,8 +576,8 @@ fn placed_apart(rows: &[Row]) -> Vec<String> {
     apart
         .map(|((name, _), [moved, kept])| {
             format!(
-                "{name}: the placement is corrected in {} but not in {}, so that what they make on one workpiece shifts against each \
-                 other. Choose --placement shape or --placement absolute for all, or give programs of RAPID that belong together as one task \
+                "{name}: the placement is corrected in {} but not in {}, so that the features that they make on one workpiece shift relative to \
+                 each other. Choose --placement shape or --placement absolute for all, or give programs of RAPID that belong together as one task \
                  (--together)",
                 listed(moved),
                 listed(kept)

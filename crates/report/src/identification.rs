@@ -17,7 +17,9 @@ use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::identification::benefit::Benefit;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::identification::verdict::{CONVERGED, NO_LIMITS, NOT_NOISE, percent_of};
+use truegrind_calibration::identification::verdict::{
+    CONVERGED, NO_LIMITS, NOT_NOISE, TARGET_NOT_SHOWN, percent_of,
+};
 use truegrind_calibration::measurement::dataset::Dataset;
 
 pub use tables::{
@@ -272,11 +274,7 @@ fn shows_more_than_noise(estimated: &Estimated) -> bool {
 
 /// Whether its verdict notes that the poses do not show where the target sits.
 fn shows_no_target(estimated: &Estimated) -> bool {
-    estimated
-        .verdict
-        .reasons
-        .iter()
-        .any(|reason| reason.contains("do not show where the target sits on the flange"))
+    estimated.verdict.reasons.iter().any(|reason| reason.contains(TARGET_NOT_SHOWN))
 }
 
 /// Expected deviation of programs before and after correction.
@@ -376,7 +374,7 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
         remark("Split", format!("{} % of the rows held out", (1e4 * from.held_out).round() / 100.0)),
         remark(
             "Angles refined",
-            if from.sharpened { "yes, by the Cartesian readout" } else { "no" }.to_owned(),
+            if from.sharpened { "yes, by the Cartesian read-out" } else { "no" }.to_owned(),
         ),
     ];
     if let Some(sheet) = &dataset.sheet {

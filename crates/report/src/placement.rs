@@ -86,8 +86,8 @@ fn apart(plan: &Plan, what: &str, is_corrected: impl Fn(&ObjectPlacement) -> boo
     let most_mm = moved_mm.map(|placement| placement.deviation_mm).fold(0.0, f64::max);
     (!moved.is_empty() && !kept.is_empty()).then(|| {
         format!(
-            "the placement is corrected for {} but not for {}: the two shift against each other by up to {most_mm:.3} mm. If these {what}s belong \
-             together, give them one user frame, or choose --placement shape or --placement absolute for both",
+            "the placement is corrected for {} but not for {}: the two shift relative to each other by up to {most_mm:.3} mm. If these {what}s \
+             belong together, give them one user frame, or choose --placement shape or --placement absolute for both",
             moved.join(", "),
             kept.join(", ")
         )
@@ -199,7 +199,7 @@ fn outcome_word(cut: &CutRisk) -> &'static str {
         (true, _) => "corrected",
         (false, true) => "left unchanged",
         // The reasons are listed with its motions.
-        (false, false) => "left for another reason",
+        (false, false) => "not corrected for another reason",
     }
 }
 

@@ -156,8 +156,9 @@ fn verdict(plan: &Plan, setup: &MeasurementSetup<'_>) -> Verdict {
     let quality = &plan.quality;
     if plan.geometry {
         reasons.push(format!(
-            "predicted 1σ of a reading at any other pose (a length, or each coordinate, as --sigma counts): {:.3} mm after one visit to each pose, {:.3} mm after as many random poses; \
-             it is the uncertainty of the link geometry alone: effects that the model does not contain come on top",
+            "predicted 1σ of a reading at any other pose (a length, or each coordinate, as for --sigma): {:.3} mm after one visit to each pose, \
+             {:.3} mm after as many random poses; it is the uncertainty of the link geometry alone: effects that the model does not contain come \
+             on top",
             quality.reading_sigma_mm, quality.random_reading_sigma_mm
         ));
     }
@@ -269,7 +270,7 @@ fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
     vec![
         rows,
         KeyFigure::new("Remaining uncertainty", plan.quality.reading_sigma_mm, 3, "mm")
-            .note("predicted 1σ of a reading at any other pose: a length, or each coordinate; effects beyond geometry not counted"),
+            .note("predicted 1σ of a reading at any other pose: a length, or each coordinate; effects beyond geometry not included"),
         KeyFigure::new("With random poses", plan.quality.random_reading_sigma_mm, 3, "mm")
             .note(format!("for comparison, {}", poses(plan))),
         KeyFigure::new(

@@ -136,9 +136,10 @@ fn gain_sentence(gain: &ExpectedGain) -> String {
     let Gain { poses, in_use_mm: in_use, tracked_mm: tracked, .. } = gain.shown;
     format!(
         "these poses decide what the fit of the model in use left open; the arm need not have changed. Programs that were corrected with it are \
-         off by {in_use_mm:.3} ± {tracked_mm:.3} mm RMS, placement of base and target excluded, and would be by {tracked_mm:.3} mm with the \
-         tracked model, beside what neither contains. Shown by {poses} poses before they were used: the tracked model predicted them to \
-         {tracked:.3} mm, the model in use fits them to {in_use:.3} mm. What to do: correct the original programs with the model written here"
+         off by {in_use_mm:.3} ± {tracked_mm:.3} mm RMS, placement of base and target excluded; with the tracked model they would be off by \
+         {tracked_mm:.3} mm. Errors that neither model contains come on top. Shown by {poses} poses before they were used: the tracked model \
+         predicted them to {tracked:.3} mm, the model in use fits them to {in_use:.3} mm. What to do: correct the original programs with the model \
+         written here"
     )
 }
 
@@ -226,7 +227,7 @@ fn key_figures(tracker: &Tracker, changes: usize, departure: Option<&Departure>)
             "median of the squared difference of readings and model, in units of what is expected (NIS); {expected:.1} if arm, sensor and \
              noise match the model"
         )),
-        KeyFigure::new("Arm against the first model", departure.map(|now| now.rms_mm), 3, "mm").note(
+        KeyFigure::new("Arm relative to the first model", departure.map(|now| now.rms_mm), 3, "mm").note(
             departure.map_or_else(String::new, |now| {
                 format!(
                     "RMS over the measured region, apart from the placement of base and target; {:.3} mm expected from the \
@@ -240,9 +241,9 @@ fn key_figures(tracker: &Tracker, changes: usize, departure: Option<&Departure>)
 }
 
 /// What to do where many poses fit neither the arm nor a change of one part.
-const DO_NOT_FIT: &str = "what to do: check the target, the line of sight and that the sensor stands where it stood; put right what moved, and \
-    track new measurements. If nothing did, more than one part of the arm changed, as in a collision: measure 30 poses or more, identify the \
-    arm again, compensate the original programs with the new model, and begin a new track with it (--model, --state)";
+const DO_NOT_FIT: &str = "what to do: check the target, the line of sight and that the sensor is where it was; put right what moved, and track new \
+    measurements. If nothing did, more than one part of the arm changed, as in a collision: measure 30 poses or more, identify the arm again, \
+    compensate the original programs with the new model, and begin a new track with it (--model, --state)";
 
 /// The last alarm that is not decided.
 fn reported(now: &Departure) -> Option<&Alarm> {
@@ -282,9 +283,9 @@ fn last_link_sentence(now: &Departure, alarms: &[Alarm]) -> Option<String> {
         _ => "since the first poses, the touched point has moved on the flange",
     };
     Some(format!(
-        "{again}: {:.3} mm. The reflector was exchanged or bumped: then the programs are right. Or joint 6 lost its zero (by {turned_deg:.4}{sigma}°), or the last \
-         link is bent: then a tool is off, by {:.3} mm at 150 mm from axis 6. The readings are the same. To tell: check the mark of \
-         joint 6, and touch a known point with the tool in two orientations of joint 6",
+        "{again}: {:.3} mm. Either the reflector was exchanged or bumped, and the programs are right; or joint 6 lost its zero (by \
+         {turned_deg:.4}{sigma}°) or the last link is bent, and a tool is off by {:.3} mm at 150 mm from axis 6. The readings look the same in all \
+         these cases. To tell them apart, check the mark of joint 6, and touch a known point with the tool in two orientations of joint 6",
         moved.moved_mm,
         moved.angle_rad.abs() * TOOL_MM
     ))
@@ -297,8 +298,8 @@ const TOOL_MM: f64 = 150.0;
 fn turn_headline(now: &Departure) -> String {
     now.turn.as_ref().map_or_else(String::new, |turn| {
         format!(
-            "arm and sensor are turned against each other by {:.3}° about axis 1, {:.3} mm at the target: the programs are not known to \
-             remain valid",
+            "arm and sensor are turned relative to each other by {:.3}° about axis 1, {:.3} mm at the target: the programs are not known to remain \
+             valid",
             turn.angle_rad.to_degrees(),
             turn.rms_mm
         )
@@ -309,11 +310,10 @@ fn turn_headline(now: &Departure) -> String {
 fn turn_sentence(now: &Departure) -> Option<String> {
     let turn = now.turn.as_ref().filter(|turn| turn.is_significant)?;
     Some(format!(
-        "since the first poses, arm and sensor have turned against each other by {:.4} ± {:.4}° about axis 1, which is {:.3} mm RMS \
-         at the target. Either joint 1 lost its zero or the base turned, and programs on parts next to the arm are off by this; or \
-         the sensor was moved about axis 1, and they are right. The readings cannot tell. Measure three points fixed to the floor: \
-         if they moved for the sensor, it was the sensor. Else measure points on the arm's foot: if they moved, it was the base, if \
-         not, joint 1",
+        "since the first poses, arm and sensor have turned relative to each other by {:.4} ± {:.4}° about axis 1, which is {:.3} mm RMS at the \
+         target. Either joint 1 lost its zero or the base turned, and programs on parts next to the arm are off by this; or the sensor was moved \
+         about axis 1, and they are right. The readings cannot tell. Measure three points fixed to the floor: if they appear to have moved, it was \
+         the sensor. If not, measure points on the foot of the arm: if they moved, it was the base; if not, joint 1",
         turn.angle_rad.to_degrees(),
         turn.sigma_rad.to_degrees(),
         turn.rms_mm
@@ -331,9 +331,8 @@ fn which_moved(alarms: &[Alarm], departed: Option<&Departure>) -> Vec<String> {
             .to_owned()
     });
     let sensor = any(Mount::Sensor).then(|| {
-        "sensor or base: the readings show only that one moved against the other. Measure three points fixed to the floor: if they \
-         moved for the sensor, it was the sensor, and the programs are right; if not, it was the base, and programs on parts next to \
-         the arm are off"
+        "sensor or base: the readings show only that one moved relative to the other. Measure three points fixed to the floor: if they appear to \
+         have moved, it was the sensor, and the programs are right; if not, it was the base, and programs on parts next to the arm are off"
             .to_owned()
     });
     target.into_iter().chain(sensor).collect()
@@ -362,27 +361,26 @@ fn departure_sentence(now: &Departure) -> String {
     out
 }
 
-/// What the scatter of the readings says of the noise that the track counts with.
+/// What the scatter of the readings says of the noise that the track assumes.
 fn noise_sentences(tracker: &Tracker) -> Vec<String> {
     let replaced = tracker.replaced_noise_mm().map(|[now, before]| {
         format!(
-            "the first poses scatter far less than the model left over ({before:.3} mm along each axis): the track counts with {now:.3} mm, \
-             so that smaller changes are seen"
+            "the first poses scatter far less than the residual of the model ({before:.3} mm along each axis), so the track assumes {now:.3} mm \
+             and sees smaller changes"
         )
     });
     let overstated = tracker.overstated_noise().map(|noise| {
         format!(
-            "remark: the readings scatter by {:.3} mm along each axis, but the track counts with {:.3} mm (--sigma, or what the model \
-             left over): a sudden change that moves the readings by less than about {:.2} mm goes unnoticed; a new track with \
-             --sigma {:.3} would see it",
+            "remark: the readings scatter by {:.3} mm along each axis, but the track assumes {:.3} mm (--sigma, or the residual of the model): a \
+             sudden change that moves the readings by less than about {:.2} mm goes unnoticed; a new track with --sigma {:.3} would see it",
             noise.seen_mm, noise.sigma_mm, noise.smallest_change_mm, 1.25 * noise.seen_mm
         )
     });
     let worse = tracker.worse_fit().map(|ratio| {
         format!(
-            "the latest readings fit {ratio:.1} times less well than the first ones, though within the noise that the track counts \
-             with: arm, sensor or target moved a little, or the poses lie elsewhere; if they lie as before, begin a new track with \
-             --sigma set to the scatter of the first ones, to find out what moved"
+            "the latest readings fit {ratio:.1} times less well than the first ones, though within the noise that the track assumes: arm, sensor \
+             or target moved a little, or the poses lie elsewhere; if they lie as before, begin a new track with --sigma set to the scatter of the \
+             first ones, to find out what moved"
         )
     });
     worse.into_iter().chain(replaced).chain(overstated).collect()

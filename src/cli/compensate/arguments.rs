@@ -106,7 +106,7 @@ pub(crate) struct Arguments {
     /// Like --dry-run, but exit with code 1 if anything would change.
     #[arg(long)]
     pub(super) check: bool,
-    /// Correct a program again that carries the mark of another model; the corrections add up.
+    /// Also correct a program that already carries the mark of another model; the two corrections add up.
     #[arg(long)]
     pub(super) again: bool,
     /// Use a doubtful model: one whose data do not show that programs improve.

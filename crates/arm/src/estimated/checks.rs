@@ -111,8 +111,8 @@ fn arms(nominal: &Model, estimated: &Model) -> Result<(), InvalidValue> {
 const SAME_LINK: f64 = 1e-6;
 
 /// What to do about links that contradict their parameters.
-const ONE_ESTIMATE: &str = "the same: the estimated arm is the nominal one with the values of its parameters, and their covariance is of \
-    that arm; use the file as it was written, or identify the arm anew";
+const ONE_ESTIMATE: &str = "the same: the estimated arm is the nominal one with the values of its parameters, and their covariance is of that arm; \
+    use the file as it was written, or identify the arm again";
 
 /// The links of the estimated arm must be what the file says was identified: the nominal ones with the values of the parameters. Programs
 /// follow the links, while their stated uncertainty is that of the parameters.

@@ -49,8 +49,8 @@ pub fn lost_in_export(model: &Model, format: Format) -> Vec<String> {
     out.extend(far_normals(model, format));
     if format == Format::UrYaml {
         out.push(
-            "the driver will report that `hash` differs from the controller's factory calibration, as it does: its own Cartesian moves know \
-             nothing of this arm"
+            "the driver will report that `hash` differs from the factory calibration of the controller. This is correct: the controller's own \
+             Cartesian moves do not use this arm"
                 .to_owned(),
         );
     }
@@ -138,7 +138,7 @@ fn angle_note(model: &Model, format: Format) -> Option<String> {
             _ => "",
         };
         format!(
-            "the file's angles are not all those of the controller (J1 to J6), and who moves the arm works them out: {}{ranges}",
+            "some joint angles of the file differ from those of the controller (J1 to J6); whoever moves the arm must compute them: {}{ranges}",
             others.join(", ")
         )
     })

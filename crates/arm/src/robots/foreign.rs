@@ -165,11 +165,11 @@ fn robot(
     let mut limits_deg = foreign.limits_deg;
     let mut sum = Vec::new();
     if ground_joint_3 {
-        // The link's own angle is the angle against the ground minus the rotation by joint 2.
+        // The link's own angle is the angle relative to the ground minus the rotation by joint 2.
         let along = fitted.parallel_2_3(file)?;
         map[(2, 1)] -= along;
         notes.push(
-            "joint 3 is counted against the ground: link 3 turns by J3 and by what J2 takes back".to_owned(),
+            "joint 3 is measured relative to the ground: the angle of link 3 to link 2 is J3 less the rotation by J2".to_owned(),
         );
         if let Some(limits) = &mut limits_deg {
             sum.push(limit_against_ground(limits, along));
@@ -220,7 +220,7 @@ fn robot(
     Ok((robot, notes, visuals))
 }
 
-/// The range of joint 3 against the ground, as the file states it, as a range of the sum of two joints; `limits_deg` of joint 3 itself become
+/// The range of joint 3 relative to the ground, as the file states it, as a range of the sum of two joints; `limits_deg` of joint 3 itself become
 /// as wide as that sum allows. `along` is 1 or −1, as joints 2 and 3 turn the same way or not.
 fn limit_against_ground(limits_deg: &mut [[f64; 2]; 6], along: f64) -> SumLimit {
     let own = limits_deg[2];
@@ -335,7 +335,7 @@ fn summarise(robot: &Robot, notes: &[String]) -> Vec<String> {
             direction(&(flange.rotation * Vector3::x()))
         ),
         format!("axes at zero, about which joints turn counter-clockwise: {}", axes.join(", ")),
-        format!("links behind axis 1 are {reach:.0} mm long together; {family}"),
+        format!("links after axis 1 are {reach:.0} mm long together; {family}"),
     ];
     if !coupled.is_empty() {
         out.push(coupled.join("; "));

@@ -56,7 +56,7 @@ pub(super) fn link_count(found: usize) -> Fault {
         "link",
         format!("{found} links"),
         "six [[robot.link]]",
-        "truegrind knows arms with six rotary axes",
+        "truegrind supports arms with six rotary axes",
     )
 }
 

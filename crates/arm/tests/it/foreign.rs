@@ -283,7 +283,7 @@ fn what_is_no_urdf_of_an_arm_is_refused_in_words() {
             replaced("<child link=\"link_2\"/>", "<child link=\"link_1\"/>"),
             &["joint_2", "that of joint joint_1 already"],
         ),
-        (replaced("<parent link=\"world\"/>", "<parent link=\"tool0\"/>"), &["no link that stands"]),
+        (replaced("<parent link=\"world\"/>", "<parent link=\"tool0\"/>"), &["no link without a parent"]),
         (replaced("0 0 0.29", "0 0 290"), &["link", "a finite length in mm"]),
         (String::new(), &["XML"]),
         ("<!DOCTYPE a [<!ENTITY b \"c\">]><robot name=\"&b;\"/>".to_owned(), &["XML"]),
@@ -464,7 +464,7 @@ fn the_drivers_file_is_read() {
     );
 }
 
-/// FANUC controllers count joint 3 against the ground: turning joint 2 alone leaves the forearm's direction as it is.
+/// FANUC controllers measure joint 3 relative to the ground: turning joint 2 alone leaves the forearm's direction as it is.
 #[test]
 fn joint_3_may_be_counted_against_the_ground() {
     let ground = ImportOptions { ground_joint_3: true, ..ImportOptions::default() };
@@ -509,7 +509,7 @@ fn joint_3_may_be_counted_against_the_ground() {
         SEVEN,
         "seven.urdf",
         &ImportOptions { ground_joint_3: true, ..only_tip("base_link", "link_6") },
-        &["against the ground"],
+        &["relative to the ground"],
     );
 }
 
@@ -549,7 +549,11 @@ fn what_is_exported_comes_back() {
             let again = read(&written, file, &ImportOptions::default()).robot.model;
             let (flange, angles) = (flange_in_last_frame(&arm, format), joint_matrix(&arm, format));
             let told = lost_in_export(&arm, format).join("\n");
-            assert_eq!(told.contains("who moves the arm"), angles != nalgebra::Matrix6::identity(), "{told}");
+            assert_eq!(
+                told.contains("whoever moves the arm"),
+                angles != nalgebra::Matrix6::identity(),
+                "{told}"
+            );
             for joints in JOINTS.map(Joints::from) {
                 let ours = arm.forward(&joints, &Condition::default());
                 let theirs = again.forward(&(angles * joints), &Condition::default()) * flange;
@@ -561,7 +565,7 @@ fn what_is_exported_comes_back() {
             }
             match (name, format) {
                 ("fanuc-lr-mate-200id", Format::Urdf) => {
-                    assert!(told.contains("out: joint 3 = J2 + J3; their ranges"), "{told}");
+                    assert!(told.contains("compute them: joint 3 = J2 + J3; their ranges"), "{told}");
                     // J2 + J3 has a range of its own.
                     let [ours, theirs] = [&arm, &again].map(|arm| (arm.limits.min_rad, arm.limits.max_rad));
                     assert!((theirs.0[2].to_degrees() + 70.0).abs() < 1e-9);

@@ -57,9 +57,9 @@ pub(super) fn rounding_finding(
             let available =
                 matches!(why, NotFused::Nothing) && dataset.rows.iter().all(|r| r.readout_mm().is_some());
             let read_out = match why {
-                _ if available => "the readout was not fused with them (--raw-columns)",
-                NotFused::Nothing => "there is no readout to fuse with them",
-                NotFused::Mismatch { .. } => "the readout contradicts them, so it was not fused with them",
+                _ if available => "the read-out was not fused with them (--raw-columns)",
+                NotFused::Nothing => "there is no read-out to fuse with them",
+                NotFused::Mismatch { .. } => "the read-out contradicts them, so it was not fused with them",
             };
             (
                 Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: before },
@@ -217,7 +217,7 @@ pub(super) fn single_angles(dataset: &Dataset) -> Option<String> {
         .collect();
     (!joints.is_empty()).then(|| {
         format!(
-            "some joints were measured at a few angles only ({}): held-out errors hold at these angles, and what a gear does between \
+            "some joints were measured at a few angles only ({}): held-out errors are valid at these angles only, and what a gear does between \
              them is unknown; measure poses at other angles before programs move there",
             joints.join(", ")
         )

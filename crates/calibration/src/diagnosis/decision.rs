@@ -198,7 +198,7 @@ impl DecisionQuestion<'_> {
             return Some(if something.is_in_time() {
                 format!("measure one pose ten times, spread over as long a time as before: `{}`", plan())
             } else {
-                format!("measure the ten poses that tell most about it: `{}`", plan())
+                format!("measure the ten poses that show most about it: `{}`", plan())
             });
         }
         // Sums of small things and tables of sessions have no part to decide on.

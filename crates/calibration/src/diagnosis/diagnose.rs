@@ -215,8 +215,7 @@ fn build_diagnosis(
         && let crate::identification::rounding::NotFused::Mismatch { found_mm, expected_mm } = why
     {
         notes.push(format!(
-            "the readout deviates from the angles by {found_mm:.2} mm, and rounding allows {expected_mm:.2} mm: it was not fused with \
-             them"
+            "the read-out deviates from the angles by {found_mm:.2} mm, and rounding allows {expected_mm:.2} mm: it was not fused with them"
         ));
     }
     notes.extend(single_angles(dataset));

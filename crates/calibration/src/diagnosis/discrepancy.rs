@@ -73,7 +73,7 @@ impl Group {
             Group::GrowthInTime => "the whole arm expanded or contracted during the measurement",
             Group::LoadInTime => "the load at the flange changed during the measurement",
             Group::CoarseField => "the error depends smoothly on the pose",
-            Group::FineField => "the error depends on the pose and changes within some ten degrees",
+            Group::FineField => "the error depends on the pose and changes within about ten degrees",
         }
     }
 }

@@ -137,7 +137,7 @@ const FREE: usize = 20;
 enum Foreign {
     /// No arm of this type, or other units or columns.
     NotThisArm,
-    /// The data sheet is nearer there: another arm of the type, or one that has changed much.
+    /// The data sheet fits those rows better: another arm of the type, or one that has changed much.
     BelowDataSheet,
     /// Another geometry explains the readings: that leaves so much (mm RMS).
     Changed(f64),
@@ -155,12 +155,12 @@ impl Foreign {
         let otherwise = "measure and diagnose the arm as it is now, or leave this file out of --also if it is of another arm";
         match self {
             Foreign::NotThisArm => {
-                "these are not measurements of this arm, or a joint counts the other way, or units or columns are wrong: correct the file or \
+                "these are not measurements of this arm, or a joint has the opposite sign, or units or columns are wrong: correct the file or \
                  leave it out of --also"
                     .to_owned()
             }
             Foreign::BelowDataSheet => format!(
-                "the data sheet is nearer there, so it is another arm of this type, or the arm has changed: {otherwise}"
+                "the data sheet fits that measurement better, so it is of another arm of this type, or the arm has changed: {otherwise}"
             ),
             Foreign::Changed(left_mm) => format!(
                 "the arm has changed, or it is another one (another geometry, fitted to those rows, leaves {left_mm:.3} mm): \

@@ -256,13 +256,13 @@ fn what_shifted(
         }
         Kind::Load { .. } => "the arm carried a load that was not logged".to_owned(),
         Kind::JointZero { joint } => format!(
-            "the zero of joint {} was off by {:.4}° against all other rows",
+            "the zero of joint {} was off by {:.4}° compared with all other rows",
             joint + 1,
             value.to_degrees().abs()
         ),
         Kind::Zero => format!("the cable's zero jumped by {value:.3} mm"),
         Kind::Frame { .. } => {
-            format!("the sensor was displaced by {:.3} mm against the arm", at_target_mm(d, measured))
+            format!("the sensor was displaced by {:.3} mm relative to the arm", at_target_mm(d, measured))
         }
         Kind::Target => format!("the target was displaced on the flange by {:.3} mm", norm(parameters)),
         _ => return None,
@@ -347,7 +347,7 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
         EmpiricalFault::TargetDroop { pole: Pole::Bracket, .. } => {
             let most = parameters.iter().take(5).map(|p| p.value.abs()).fold(0.0, f64::max);
             format!(
-                "the target droops on its adapter by some {most:.3} mm under gravity, as the flange turns"
+                "the target droops on its adapter by about {most:.3} mm under gravity, as the flange turns"
             )
         }
         EmpiricalFault::TargetDroop { pole, .. } => format!(
@@ -489,9 +489,7 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         }
         ToolShift => "fasten the hook or reflector; measure the rows after the slip again",
         SensorScale => "check the sensor against a length standard",
-        SensorAxes => {
-            "calibrate the sensor anew, and check it against a length standard along each of its axes"
-        }
+        SensorAxes => "recalibrate the sensor, and check it against a length standard along each of its axes",
         SensorRange => {
             "check the reflector's constant and the sensor against a length standard at several distances"
         }

@@ -184,15 +184,15 @@ const TIP_MM: f64 = 300.0;
 /// How many times that of the target it is from which it is stated.
 const STATED_FROM: f64 = 1.3;
 
-/// What the errors beyond the noise, of which the target saw `beyond_mm`, make of a longer tool; `None` where the target is as far out.
+/// What the errors beyond the noise, which move the target by `beyond_mm`, do to a longer tool; `None` where the target is as far out.
 pub(crate) fn longer_tool(estimated: &Estimated, beyond_mm: f64) -> Option<String> {
     let tip = Pose::translation(0.0, 0.0, TIP_MM);
     let tip_mm = erring(estimated).displacement_mm(&tip, &estimated.beyond_noise_rad?);
     (tip_mm > STATED_FROM * beyond_mm).then(|| {
         format!(
-            "the target sits close to the flange: what the model does not contain moves it by {beyond_mm:.3} mm, and a tool tip {TIP_MM:.0} mm in \
-             front of the flange by some {tip_mm:.3} mm (RMS, if it is errors of the joints' angles), one that is off the axis of joint 6 by more; \
-             compensate counts this for the tool of each program"
+            "the target sits close to the flange: errors that the model does not contain move it by {beyond_mm:.3} mm RMS. If they are errors of \
+             the joint angles, they move a tool tip {TIP_MM:.0} mm in front of the flange by about {tip_mm:.3} mm RMS, and more if the tip is off \
+             the axis of joint 6. `compensate` includes this for the tool of each program"
         )
     })
 }

@@ -663,14 +663,14 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     verdict.check_links(case.parameters, &options.tolerance, 0.0);
     if !case.still.is_empty() {
         verdict.note(format!(
-            "{} of less than {:.0}°: whatever these rows do not show of {} stays as in the data sheet",
+            "{} of less than {:.0}°: {} parameters that these rows do not determine stay as in the data sheet",
             if case.still.len() == 1 {
                 format!("joint {} moved through a range", case.still[0])
             } else {
                 format!("joints {} moved through ranges", listed(&case.still))
             },
             STILL_DEG,
-            if case.still.len() == 1 { "it" } else { "them" }
+            if case.still.len() == 1 { "its" } else { "their" }
         ));
     }
     if let Some(unseen_target) = &case.unseen_target {
@@ -678,8 +678,8 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     }
     if let Some(pattern) = case.repeats {
         verdict.note(format!(
-            "{NOT_NOISE}: {pattern}. That was not taken for noise of the sensor where the expected error is stated; `diagnose` finds what it is \
-             and a model without it"
+            "{NOT_NOISE}: {pattern}. The expected error does not treat this as sensor noise; `diagnose` looks for the cause and fits a model \
+             without it"
         ));
     }
     if let Some(longer_tool) = &case.longer_tool {

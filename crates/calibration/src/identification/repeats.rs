@@ -285,8 +285,8 @@ impl Case<'_> {
         let axes = self.axes as f64;
         let [others_mm, mm] = [mixture.narrow, mixture.wide].map(|variance| (axes * variance).sqrt());
         let cause = if gross.is_empty() {
-            "gears with play come to rest on either side, which columns approach1 to approach6 would tell, or the target or the arm does not \
-             hold still"
+            "gears with play come to rest on either side, which columns approach1 to approach6 would show, or the target or the arm does not stay \
+             still"
                 .to_owned()
         } else {
             let numbers: Vec<usize> = gross.iter().map(|&row| self.dataset.rows[row].number).collect();

@@ -56,8 +56,8 @@ impl Rounding {
         let step_deg = step_rad?.to_degrees();
         (rounding_mm.powi(2) >= TOLD_SHARE * held_out_mm.powi(2)).then(|| {
             format!(
-                "the log rounds joint angles to {step_deg:.3}°, which by itself moves the target by {rounding_mm:.3} mm RMS, in held-out rows \
-                 too: no error of the arm, it is left out of the expected error; log angles with more digits"
+                "the log rounds joint angles to {step_deg:.3}°, which alone moves the target by {rounding_mm:.3} mm RMS, in held-out rows too. \
+                 This is not an error of the arm, so the expected error does not include it; log the angles with more digits"
             )
         })
     }

@@ -241,7 +241,7 @@ pub const FURTHER_SOLVERS: &[Solver] = &[
     method!("sslm", "LM with a step size found by line search", LeastSquares, robust sslm),
     method!("vslm", "variable step-size LM that grows back to whole steps", LeastSquares, robust vslm),
     method!("least-squares", "Gauss–Newton with halved steps, with priors", LeastSquares, robust gauss_newton),
-    method!("ekf", "extended Kalman filter, one sweep, each row counted once", Filter, robust ekf),
+    method!("ekf", "extended Kalman filter, one sweep, each row used once", Filter, robust ekf),
     method!("ukf", "scaled unscented Kalman filter with Q and R", Filter, robust ukf),
     method!("ukf-vslm", "scaled UKF, then step-size LM until it converges", LeastSquares, robust ukf_vslm),
     method!("pf", "particle filter, tempered, with a kernel that moves its particles", Filter, robust pf),

@@ -114,8 +114,8 @@ pub fn contradicted_target(
     let off_mm = (touched.translation.vector - at).norm();
     (off_mm > OF_ANY_ARM_MM.max(of_this_arm_mm).max(SIGMAS * sigma_mm)).then(|| {
         format!(
-            "--touched-point: the readings put the target {off_mm:.1} mm from there, at {:.1},{:.1},{:.1} on the flange: check that it is in mm in \
-             the flange frame, and of this set-up",
+            "--touched-point: the readings put the target {off_mm:.1} mm from there, at {:.1},{:.1},{:.1} on the flange: check that it is given in \
+             mm in the flange frame, and that it belongs to this set-up",
             at.x, at.y, at.z
         )
     })
@@ -154,8 +154,9 @@ pub fn target_contradiction_by_fit(
     let leaves_more = with.is_none_or(|with| with.sigma_mm > OF_FIT * free.sigma_mm.max(ANY_NOISE_MM));
     (is_off || leaves_more).then(|| {
         format!(
-            "--touched-point: with the arm's geometry fitted the readings put the target {:.1} mm from there, at {:.1},{:.1},{:.1} on the \
-             flange, which contradicts it by {:.0} standard deviations: check that it is in mm in the flange frame, and of this set-up",
+            "--touched-point: with the arm's geometry fitted the readings put the target {:.1} mm from there, at {:.1},{:.1},{:.1} on the flange, \
+             which contradicts it by {:.0} standard deviations: check that it is given in mm in the flange frame, and that it belongs to this \
+             set-up",
             away.norm(),
             at.x,
             at.y,
@@ -204,7 +205,8 @@ pub fn contradiction(
     } else if explains(&in_metres) {
         "its position is in metres: state it in mm"
     } else {
-        "check that it is the sensor in the arm's base, in mm and scalar first, and of this set-up"
+        "check that it is the pose of the sensor in the base of the arm, in mm with the scalar of the quaternion first, and that it belongs to \
+         this set-up"
     };
     let at = best.translation.vector;
     Some(format!(
@@ -293,15 +295,27 @@ pub fn judged_by_fit(
 /// What speaks against a stated frame, or a cable's outlet and zero, by what geometry leaves `with` it beside what it leaves `free` of it;
 /// `None` if nothing does. Without a fit with it, none is possible.
 fn contradiction_by_fit(dataset: &Dataset, free: &Fitted, with: Option<&Fitted>) -> Option<String> {
-    let option = if dataset.sensor == Sensor::Cable { "--outlet and --cable-zero" } else { "--sensor-frame" };
+    let (option, it, check) = if dataset.sensor == Sensor::Cable {
+        (
+            "--outlet and --cable-zero",
+            "them",
+            "check that they are in mm, the outlet in the base of the arm, and that they belong to this set-up, state how uncertain they are \
+             (--frame-sigma), or leave them out",
+        )
+    } else {
+        (
+            "--sensor-frame",
+            "it",
+            "check that it is the pose of the sensor in the base of the arm, in mm with the scalar of the quaternion first, and that it belongs \
+             to this set-up, state how uncertain it is (--frame-sigma), or leave it out",
+        )
+    };
     let least_mm = free.sigma_mm;
-    let check = "check that it is the sensor in the arm's base, in mm and scalar first, and of this set-up, state how uncertain it is \
-                 (--frame-sigma), or leave it out";
     match with {
-        None => Some(format!("{option}: no arm fits the readings with it: {check}")),
+        None => Some(format!("{option}: no arm fits the readings with {it}: {check}")),
         Some(with) => (with.sigma_mm > OF_FIT * least_mm.max(ANY_NOISE_MM)).then(|| {
             format!(
-                "{option}: with it the best geometry leaves {:.3} mm along each axis, without it {least_mm:.3} mm: {check}",
+                "{option}: with {it} the best geometry leaves {:.3} mm along each axis, without {it} {least_mm:.3} mm: {check}",
                 with.sigma_mm
             )
         }),

@@ -1,6 +1,6 @@
 //! What to say where the poses do not show the place of the target on the flange.
 //!
-//! In one orientation of the flange another place of the target is another place of the sensor, so that it stays where its prior has it.
+//! In one orientation of the flange, moving the target has the same effect as moving the sensor, so that the target stays where its prior has it.
 //! The fit then describes the motion of the target, wherever it is. At a tip at r from it the arm's errors of orientation ω are added,
 //! ω × r, of which these poses show as little: with J the rotations that the arm's parameters cause at a pose, less their mean over the
 //! poses (which placing the work object takes up), and Σ the covariance of the parameters, the mean square over all directions of r is
@@ -9,6 +9,7 @@
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen, UnitQuaternion};
 
 use super::fit::Fitted;
+use super::verdict::TARGET_NOT_SHOWN;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::registration;
 use truegrind_arm::estimated::Estimated;
@@ -68,11 +69,10 @@ pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Esti
         format!("{:.decimals$}", (at[k] * scale).round() / scale + 0.0)
     });
     Some(format!(
-        "these poses, {poses}, do not show where the target sits on the flange: another place of the target looks like another place \
-         of the sensor. It is taken to be {x},{y},{z} mm and known to ± {known_mm:.decimals$} mm only (--touched-point and \
-         --touched-sigma state it). The errors in mm here are those of the target; a tool whose tip is {TIP_MM:.0} mm from it may be \
-         off by a further {:.3} mm (1 sigma), in proportion to its distance. To see it, measure two or three more poses with the \
-         flange turned by 30° or more about different axes",
+        "these poses, {poses}, {TARGET_NOT_SHOWN}: moving the target has the same effect on the readings as moving the sensor. Its position is \
+         taken as {x},{y},{z} mm, known only to ± {known_mm:.decimals$} mm (--touched-point and --touched-sigma state it). The errors in mm here \
+         are those of the target; a tool whose tip is {TIP_MM:.0} mm from it may be off by a further {:.3} mm (1 sigma), in proportion to its \
+         distance. To see it, measure two or three more poses with the flange turned by 30° or more about different axes",
         tip_mm(estimated)
     ))
 }
@@ -94,7 +94,7 @@ fn turning(flanges: &[Pose]) -> String {
     if beside_main_axis_deg(&rotations) < ONE_AXIS_DEG {
         return "which turn the flange about one axis only".to_owned();
     }
-    "which are too few, or turn the flange too little about different axes, for what the readings are off by"
+    "which are too few, or turn the flange too little about different axes, compared with the errors of the readings"
         .to_owned()
 }
 

@@ -32,6 +32,9 @@ pub const NO_LIMITS: &str = "held-out error not evaluated: no limits were stated
 /// Begin of the note that repeated poses show more than noise: what was measured moved, so that the model is used with care.
 pub const NOT_NOISE: &str = "repeated poses differ by more than the noise of a reading";
 
+/// Part of the note that the poses do not show the place of the target: headlines of reports look for it.
+pub const TARGET_NOT_SHOWN: &str = "do not show where the target sits on the flange";
+
 /// End of the note on a fit that converged.
 pub const CONVERGED: &str = "the fit converged";
 
@@ -304,7 +307,7 @@ fn scale_sentence(scale: &ScaleError, sensor: Sensor) -> String {
 fn law_sentence(law: &LawError) -> String {
     let (error, remedy) = match law.kind {
         SensorLaw::Pulley => (
-            "a cable that runs over a pulley at its outlet, of a radius of some 10 mm,",
+            "a cable that runs over a pulley at its outlet, of a radius of about 10 mm,",
             "measure poses that swing the cable further about its outlet (random poses over the full ranges of the joints, or some \
              with the outlet elsewhere); a cable that leaves its sensor through a small hole has no such error",
         ),
@@ -315,8 +318,8 @@ fn law_sentence(law: &LawError) -> String {
         ),
         SensorLaw::Lens => (
             "a sensor whose scale changes over its field, as that of a camera whose lens distorts,",
-            "measure a known length (a scale bar) in the middle and at the edges of the field, calibrate the camera anew, and measure poses \
-             with the flange turned as far as it can be seen at each place; with readings that are true over the whole field, identify again",
+            "measure a known length (a scale bar) in the middle and at the edges of the field, recalibrate the camera, and measure poses with the \
+             flange turned as far as it can be seen at each place; with readings that are true over the whole field, identify again",
         ),
     };
     let explains = if law.probability > FOUND {

@@ -44,8 +44,8 @@ fn by_clock(mut dataset: Dataset, times: &[f64]) -> Dataset {
             std::sync::Arc::make_mut(&mut row.condition).time_h = None;
         }
         dataset.notes.push(format!(
-            "column t starts again at {}: the time between is unknown, so t is not used and the rows count in the order of the file; \
-             state the hours since one start in all rows",
+            "column t starts again at {}; how much time passed in between is unknown, so t is not used and the rows are taken in the order of the \
+             file; give hours since one common start in all rows",
             row_list(&numbers)
         ));
         return dataset;

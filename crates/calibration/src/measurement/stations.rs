@@ -21,8 +21,8 @@ const FEWEST: usize = 4;
 /// The rows of a station do not say where it stood.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "{file}: what was measured from station {station} (column station: {}) does not show where it stood: measure at least {FEWEST} poses from each \
-     station, not on a line, and write its name alike in all of its rows",
+    "{file}: the rows of station {station} (column station: {}) do not determine where it stood: measure at least {FEWEST} poses that are not on \
+     one line from each station, and spell its name the same way in all of its rows",
     row_list(.numbers)
 )]
 pub struct StationError {
@@ -73,7 +73,8 @@ pub(super) fn in_frame_of_first(dataset: &mut Dataset, nominal: &Model) -> Resul
     }
     let counts: Vec<String> = stations.iter().map(|rows| rows.len().to_string()).collect();
     dataset.notes.push(format!(
-        "{} stations with {} rows: readings are in the frame of the first, and how the others stand to it is fitted with the arm",
+        "{} stations with {} rows: readings are expressed in the frame of the first station; the poses of the others relative to it are fitted \
+         together with the arm",
         stations.len(),
         truegrind_math::sentence::listed(&counts)
     ));

@@ -105,7 +105,8 @@ fn what_to_do(left_mm: f64, changed_mm: Option<f64>) -> String {
     }
     if let Some(changed_mm) = changed_mm {
         return format!(
-            "the arm has changed since, as another geometry leaves {changed_mm:.3} mm: identify it again and correct the programs anew"
+            "the arm has changed since, as another geometry leaves {changed_mm:.3} mm: identify it again and correct the original programs with \
+             the new model"
         );
     }
     format!(

@@ -43,7 +43,7 @@ const FEW: usize = 30;
 /// Readings that scatter far less than the track counts with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Overstated {
-    /// Noise that the track counts with, along each axis (mm).
+    /// Noise that the track assumes, along each axis (mm).
     pub sigma_mm: f64,
     /// Noise that the readings show (mm).
     pub seen_mm: f64,

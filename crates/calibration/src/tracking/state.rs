@@ -146,7 +146,7 @@ pub struct State {
     /// Pose number at which the next such snapshot is taken; 0 for none.
     #[serde(default)]
     pub(super) placed_at: usize,
-    /// Scatter of the first poses, in units of the noise that the track counts with.
+    /// Scatter of the first poses, in units of the noise that the track assumes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) start_scatter: Option<f64>,
     /// The noise that the track began with, where the first poses showed it several times too large (mm).

@@ -330,8 +330,8 @@ fn with_order(message: String) -> String {
         Some(key) => {
             let message = message.trim_end();
             format!(
-                "{message}; `{key}` is there, but below the head of a section, to which TOML then counts it: put it above the first [[tool]], \
-                 [[wobj]] or [[external]]"
+                "{message}; `{key}` is there, but below the head of a section, so TOML reads it as part of that section: put it above the first \
+                 [[tool]], [[wobj]] or [[external]]"
             )
         }
     }

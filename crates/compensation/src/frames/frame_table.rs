@@ -182,7 +182,7 @@ impl FrameTable {
                      to carry the robot's base (cell file, [[external]])"
                 )
             } else {
-                let state = if moves[axis] { "moves" } else { "does not stand at 0" };
+                let state = if moves[axis] { "moves" } else { "is not at 0" };
                 format!(
                     "external axis {letter} {state}: assumed not to carry the robot's base; state what it carries (cell file, \
                      [[external]])"

@@ -37,7 +37,7 @@ pub(crate) fn backlash_note(arms: &Arms<'_>, solved: &SolvedTargets<'_>) -> Opti
     ))
 }
 
-/// Doubtful effects: not corrected, but counted in every σ.
+/// Doubtful effects: not corrected, but included in every σ.
 pub(crate) fn doubtful_effects_note(arms: &Arms<'_>) -> Option<String> {
     let still = arms.estimated.arm().model.effects.iter().filter(|effect| effect.is_zero());
     let named: Vec<String> = still
@@ -47,7 +47,7 @@ pub(crate) fn doubtful_effects_note(arms: &Arms<'_>) -> Option<String> {
         })
         .collect();
     (!named.is_empty())
-        .then(|| format!("not certain, so counted in every σ but not corrected: {}", named.join(", ")))
+        .then(|| format!("not certain, so included in every σ but not corrected: {}", named.join(", ")))
 }
 
 /// How many times the largest σ an error beyond the noise is from which it is stated, where no σ counts it.
@@ -56,10 +56,10 @@ const BEYOND_SIGMA: f64 = 2.0;
 /// Share of the largest σ from which an error that it counts is stated.
 const COUNTED_SHARE: f64 = 0.5;
 
-/// Sets of missing words that are told.
+/// Sets of missing words that are reported.
 const TOLD_SETS: usize = 4;
 
-/// The words that motions lack behind labels, jumps, calls and loops, each set with its lines.
+/// The words that motions lack after labels, jumps, calls and loops, each set with its lines.
 fn unstated_notes(listing: &Listing) -> Vec<String> {
     let mut sets: Vec<(&str, Vec<u32>)> = Vec::new();
     for (motion, words) in &listing.nc.unstated {
@@ -71,9 +71,9 @@ fn unstated_notes(listing: &Listing) -> Vec<String> {
     let note = |(words, motions): &(&str, Vec<u32>)| {
         let lines = lines_of(listing, motions)?;
         Some(format!(
-            "behind a label, jump, call, loop or branch the text does not tell these, and {} without them: {words}. State them in the first \
-             of these blocks or between the label and it ({lines})",
-            counted(motions.len(), "motion is left", "motions are left")
+            "after a label, jump, call, loop or branch the program text does not determine {words}, so {}. State these words in the first of these \
+             blocks, or between it and the label ({lines})",
+            counted(motions.len(), "motion is not corrected", "motions are not corrected")
         ))
     };
     sets.iter().take(TOLD_SETS).filter_map(note).collect()
@@ -89,9 +89,9 @@ pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item =
         return (beyond > COUNTED_SHARE * largest).then(|| {
             let (least, most) = rad.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), rad| (a.min(*rad), b.max(*rad)));
             format!(
-                "every σ counts the {beyond:.3} mm RMS by which the measurement deviates from this model beyond noise, as errors of {:.4} to {:.4}° \
-                 in the joints (a longer tool is off by more) that are alike in poses less than {:.0}° apart; `truegrind diagnose` \
-                 looks for their causes",
+                "every σ includes the {beyond:.3} mm RMS by which the measurement deviates from this model beyond noise, as errors of {:.4} to \
+                 {:.4}° in the joints (a longer tool is off by more) that are alike in poses less than {:.0}° apart; `truegrind diagnose` looks \
+                 for their causes",
                 least.to_degrees(),
                 most.to_degrees(),
                 ALIKE_RAD.to_degrees()
@@ -114,9 +114,9 @@ pub(crate) fn unseen_note(knowledge: &Estimated, unseen: &UnseenShare) -> Option
     let name = &knowledge.parameters.get(unseen.parameter?)?.name;
     (unseen.unseen_mm > WORTH_TELLING_MM).then(|| {
         format!(
-            "of the {:.3} mm (1σ) stated for a cut, {:.3} mm are not what the measurement found uncertain but what it could not show: {name} above all \
-             keeps the tolerance of this arm's links, since the place of the target on the flange is not known independently. Where tool and work \
-             object are taught with this arm (cell file, origin = \"taught\"), such errors cancel",
+            "of the {:.3} mm (1σ) stated for a cut, {:.3} mm come from parameters that the measurement did not determine: above all {name} keeps \
+             the tolerance of this arm's links, since the place of the target on the flange is not known independently. Where tool and work object \
+             are taught with this arm (cell file, origin = \"taught\"), such errors cancel",
             unseen.sigma_mm, unseen.unseen_mm
         )
     })
@@ -171,9 +171,9 @@ pub(crate) fn unchecked_notes(
     out.extend(unstated_notes(listing));
     if let Some(lines) = lines_of(listing, &listing.nc.external_calls) {
         out.push(format!(
-            "{} that is not followed: NC programs are read each by itself, whether or not the other one is given too, lies in the same folder or \
-             stands in the same archive file (--together does not join NC programs). It is assumed to leave work offset, shifts, tool, units and tool \
-             centre point control unchanged; state behind the call again what it changes ({lines})",
+            "{} that is not followed: each NC program is read by itself, even if the other one is given too, lies in the same folder or is in the \
+             same archive file (--together does not join NC programs). It is assumed to leave work offset, shifts, tool, units and tool centre \
+             point control unchanged; state again after the call what it changes ({lines})",
             counted(listing.nc.external_calls.len(), "block calls another program", "blocks call another program")
         ));
     }
@@ -224,12 +224,12 @@ fn open_control_note(listing: &Listing) -> Option<String> {
     ))
 }
 
-/// LinuxCNC files that change the tool without taking over its length.
+/// LinuxCNC files that change the tool without activating its length.
 fn unstated_length_note(listing: &Listing) -> Option<String> {
     let lines = numbered(&listing.files, listing.nc.unstated_lengths.iter().copied())?;
     Some(format!(
-        "no G43: LinuxCNC does not take over the length of a tool by T and M6, so the tool tip is where the tool is said to have it only if G43 \
-         is still active from before. State G43 behind M6, or G49 where X Y Z are not those of the tip (before {lines})"
+        "no G43: on LinuxCNC, T and M6 do not activate the tool length, so X Y Z are the tool tip only if G43 is still active from before. Program \
+         G43 after M6, or G49 where X Y Z are not those of the tip (before {lines})"
     ))
 }
 
@@ -237,8 +237,8 @@ fn unstated_length_note(listing: &Listing) -> Option<String> {
 fn position_decisions_note(listing: &Listing) -> Option<String> {
     let lines = numbered(&listing.files, listing.position_decisions.iter().copied())?;
     Some(format!(
-        "the program decides by the position that the robot reads (CRobT, CPos, CJointT). Behind a corrected motion that is the corrected position: \
-         see that each tolerance there is wider than the largest correction ({lines})"
+        "the program decides by the position that the robot reads (CRobT, CPos, CJointT). After a corrected motion that is the corrected position: \
+         check that each tolerance there is wider than the largest correction ({lines})"
     ))
 }
 
@@ -263,8 +263,9 @@ fn outside_calls_note(listing: &Listing) -> Option<String> {
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     (!named.is_empty()).then(|| {
         format!(
-            "routines missing from the files are called: {}{more}. They are assumed not to change tools, work objects and targets of the files, or \
-             numbers behind these, program displacement, switches (ConfL, SingArea, SoftAct …) or load; give their modules too (--together)",
+            "routines missing from the files are called: {}{more}. They are assumed not to change tools, work objects or targets of the files, \
+             numbers that these are computed from, the program displacement, switches (ConfL, SingArea, SoftAct …) or the load; give their modules \
+             too (--together)",
             named.join(", ")
         )
     })
@@ -321,7 +322,7 @@ pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) 
     }
     if loads.unknown() > 0 {
         out.push(format!(
-            "payload: at {} the load set by GripLoad is unknown; only the tool is counted",
+            "payload: at {} the load set by GripLoad is unknown; only the load of the tool is used",
             counted(loads.unknown(), "motion", "motions")
         ));
     }

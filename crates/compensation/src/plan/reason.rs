@@ -225,7 +225,9 @@ impl OutcomeReason {
                 "a joint would exceed its limits on the corrected path to it"
             }
             OutcomeReason::CorrectionTooLarge { .. } => "correction exceeds the bound (--max-correction)",
-            OutcomeReason::RotationTooLarge { .. } => "correction of the orientation exceeds the bound",
+            OutcomeReason::RotationTooLarge { .. } => {
+                "correction of the orientation exceeds the bound (by default 2°)"
+            }
             OutcomeReason::NearSingularity => "too close to a singularity",
             OutcomeReason::OtherBranch => "the corrected target lies in another configuration",
             OutcomeReason::PathDeviation { mm } if !mm.is_finite() => "the arm cannot follow the path to it",
@@ -275,10 +277,11 @@ impl OutcomeReason {
                 "a joint is outside the range in which the arm was measured"
             }
             OutcomeReason::JointJump { on_the_way: false, .. } => {
-                "the correction would turn a joint too far, since the arm is near a singularity: move the path away from it"
+                "the correction would turn a joint too far, because the arm is near a singularity: move the path away from the singularity"
             }
             OutcomeReason::JointJump { on_the_way: true, .. } => {
-                "on the way to it the correction would turn a joint too far, since the arm is near a singularity: move the path away from it"
+                "on the path to this target the correction would turn a joint too far, because the arm is near a singularity: move the path away \
+                 from the singularity"
             }
             OutcomeReason::SingularPath => "the corrected path to it passes too close to a singularity",
             OutcomeReason::AmbiguousBranch => {
@@ -295,8 +298,8 @@ impl OutcomeReason {
                 "the step to an uncorrected motion of the same cut would exceed --tolerance"
             }
             OutcomeReason::AirMoveAlone => {
-                "an air move next to a cut that is not corrected: correcting it would move the start of the cut, and the axes that its blocks \
-                 omit"
+                "an air move next to a cut that is not corrected: correcting the air move would shift the start of the cut, and the values of the \
+                 axes that the blocks of the cut omit"
             }
             OutcomeReason::NoConsistentPlan => {
                 "no consistent plan was found: each motion that was not corrected kept others from being corrected; divide the program"
@@ -441,13 +444,13 @@ impl fmt::Display for OutcomeReason {
                 write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)")
             }
             OutcomeReason::RotationTooLarge { deg } => {
-                write!(f, "correction of the orientation by {deg:.3}° exceeds the bound")
+                write!(f, "correction of the orientation by {deg:.3}° exceeds the bound (by default 2°)")
             }
             OutcomeReason::JointJump { joint, deg, most_deg, on_the_way } => write!(
                 f,
-                "{}the correction would turn joint {} by {deg:.1}° (limit {most_deg:.1}°), since the arm is near a singularity: move the \
-                 path away from it",
-                if *on_the_way { "on the way to it " } else { "" },
+                "{}the correction would turn joint {} by {deg:.1}° (limit {most_deg:.1}°), because the arm is near a singularity: move the path \
+                 away from the singularity",
+                if *on_the_way { "on the path to this target " } else { "" },
                 joint + 1
             ),
             OutcomeReason::PathDeviation { mm } if mm.is_finite() => {

@@ -99,7 +99,7 @@ impl SinglePrecision {
             parts.push("nothing".to_owned());
         }
         format!(
-            "read in single precision, as RAPID holds numbers, targets are off by at most {} beyond what is stated here",
+            "read in single precision, as RAPID stores numbers, targets are off by at most {} beyond what is stated here",
             parts.join(", ")
         )
     }

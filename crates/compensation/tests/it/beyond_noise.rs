@@ -122,7 +122,7 @@ fn every_sigma_counts_the_errors_that_the_model_does_not_contain() {
     let plan = planned(&source, &known, Placement::Absolute);
     let stated = rms_of(some(&plan).iter().filter_map(|p| p.sigma_mm));
     assert!((stated / rms(&errors) - 1.0).abs() < 0.08, "{stated} stated, {} drawn", rms(&errors));
-    assert!(plan.notes.iter().any(|note| note.contains("every σ counts the 0.060 mm")), "{:?}", plan.notes);
+    assert!(plan.notes.iter().any(|note| note.contains("every σ includes the 0.060 mm")), "{:?}", plan.notes);
 }
 
 #[test]

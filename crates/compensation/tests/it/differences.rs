@@ -1,4 +1,4 @@
-//! A program that was corrected differs from its original in its targets alone; whatever else differs is told by line.
+//! A program that was corrected differs from its original in its targets alone; whatever else differs is listed by line.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;

@@ -40,7 +40,7 @@ fn a_grip_is_followed_through_statements_branches_loops_and_calls() {
         masses("PROC main()\n m;\n GripLoad part;\n m;\n GripLoad load0;\n m;\nENDPROC\n"),
         [tool, both, tool]
     );
-    // Both branches grip it: known afterwards; one does: unknown, and only the tool is counted.
+    // Both branches grip it: known afterwards; one does: unknown, and only the load of the tool is used.
     let body = "PROC main()\n IF a THEN\n GripLoad part;\n ELSE\n GripLoad part;\n ENDIF\n m;\nENDPROC\n";
     assert_eq!(masses(body), [both]);
     let (_, loads) = grips("PROC main()\n IF a THEN\n GripLoad part;\n ENDIF\n m;\nENDPROC\n");

@@ -484,7 +484,7 @@ fn sigma_that_no_reading_has_seen_is_told_as_such() {
     let said = |known: &Estimated| {
         let options = Options { max_risk: 1.0, ..with(Placement::Absolute) };
         let (plan, _) = rewritten(&source, known, &Cell::default(), &options);
-        let note = plan.notes.iter().find(|note| note.contains("could not show")).cloned();
+        let note = plan.notes.iter().find(|note| note.contains("did not determine")).cloned();
         (plan.cuts.iter().map(|cut| cut.sigma_mm).fold(0.0, f64::max), note)
     };
     let names: Vec<String> = drawn.known.order.iter().map(ToString::to_string).collect();

@@ -342,7 +342,7 @@ fn an_axis_that_stands_elsewhere_than_at_0_is_asked_for() {
         let plan = planned(text.as_bytes(), &known(), &Cell::default(), &Options::default());
         (
             plan.unstated_axes.clone(),
-            plan.notes.iter().any(|note| note.contains("external axis a does not stand at 0")),
+            plan.notes.iter().any(|note| note.contains("external axis a is not at 0")),
         )
     };
     assert_eq!(go("300"), (vec!['a'], true));

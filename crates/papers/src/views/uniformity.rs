@@ -139,7 +139,7 @@ fn verdict(result: &UniformityResult) -> Verdict {
         ));
     }
     reasons.push(
-        "This does no harm: a line search over some ten candidates does not need uniform points.".to_owned(),
+        "This does no harm: a line search over about ten candidates does not need uniform points.".to_owned(),
     );
     Verdict::new(if verdict.sampling_noise { Status::Warning } else { Status::Good }, headline, reasons)
 }

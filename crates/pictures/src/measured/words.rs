@@ -61,11 +61,11 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>, shape: Option<&Shape>) -> Stri
             "- Points: planned positions of the measured point, all rows. Orange: the expected reading.\n",
         );
     } else if scene.residuals.is_empty() {
-        text.push_str("- Points: where the flange stood, all rows.\n");
+        text.push_str("- Points: where the flange was, all rows.\n");
     } else {
         text.push_str(
-            "- Points: where the touched point stood, all rows; dark blue is a residual of 0, yellow a large one (bar \
-             below). Orange: sensor, and its reading at the row.\n",
+            "- Points: where the touched point was, all rows; dark blue is a residual of 0, yellow a large one (bar below). Orange: sensor, and \
+             its reading at the row.\n",
         );
         let stages: Vec<String> = scene.residuals.iter().map(|r| line(&r.stage)).collect();
         let _ = write!(text, "- Curves: the residual of each row, {}", stages.join("; "));

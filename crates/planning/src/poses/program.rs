@@ -75,7 +75,7 @@ pub fn draft(plan: &Plan, setup: &MeasurementSetup<'_>, drive: &ProgramSettings)
             ),
             format!("Checked: joint limits, singularities{}; {}.", beside_links(plan, setup), checked(plan)),
             format!("Not checked: {}.", unchecked(plan, setup.sensor)),
-            "Run it slowly first. Take one reading at each WaitTime, in this order; rows count as in a spreadsheet with its header."
+            "Run it slowly first. Take one reading at each WaitTime, in this order; rows are numbered as in a spreadsheet with a header."
                 .to_owned(),
         ],
         tool: (

@@ -51,7 +51,7 @@ pub enum DiagnosisFileError {
     },
     /// No open finding has the number.
     #[error(
-        "finding {number} is no open one: expected the number of an ambiguous finding, as the report counts ({open})"
+        "finding {number} is not open: expected the number of an ambiguous finding, as in the report ({open})"
     )]
     Finding {
         /// The stated number.
@@ -133,7 +133,7 @@ pub struct Open {
     pub joint_scatters: bool,
 }
 
-/// What a diagnosis left open: everything, or only the finding with a number (from 1, as the report counts).
+/// What a diagnosis left open: everything, or only the finding with a number (from 1, as in the report).
 ///
 /// # Errors
 /// [`DiagnosisFileError`] if the text is not a diagnosis, or if that finding is not open.

@@ -19,7 +19,7 @@ use crate::rewrite::RewriteOptions;
 pub enum WriteError {
     /// A dialect without a writer.
     #[error(
-        "{dialect} programs are read and rewritten, not written anew: name a .nc (Fanuc) or .mpf (Siemens) file"
+        "{dialect} programs are read and rewritten, but new ones are not written: name a .nc (Fanuc) or .mpf (Siemens) file"
     )]
     Dialect {
         /// Its name.

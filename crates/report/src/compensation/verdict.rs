@@ -65,12 +65,13 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
         ),
         (
             !listing.nc.unstated_lengths.is_empty(),
-            "Corrected as if the length of the tool were active, but no G43 takes it over: state it before running the program",
+            "Corrected as if the tool length were active, but no G43 activates it: program G43, or G49 if it is not meant to be active, before \
+             running the program",
         ),
         (
             depends_on_call(plan, listing),
-            "Corrected, but a call of another program may change what holds behind it, as each NC program is read by itself: state it again \
-             behind the call, or check these motions",
+            "Corrected, but a call of another program may change the modal state, and each NC program is read by itself: state it again after the \
+             call, or check the motions there",
         ),
         (
             !plan.unstated_axes.is_empty(),
@@ -78,7 +79,8 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
         ),
         (
             plan.unknown_loads > 0,
-            "Corrected, but where GripLoad sets the load at run time only the tool is counted: check these motions before running the program",
+            "Corrected, but where GripLoad sets the load at run time only the load of the tool is used: check these motions before running the \
+             program",
         ),
         (
             plan.is_overloaded,

@@ -238,7 +238,7 @@ pub fn outlier_table(found: &Identification, dataset: &Dataset) -> Table {
         });
     }
     table.notes.push(format!(
-        "Beyond {OUTLIER_CUT} robust standard deviations of a robust fit of geometry. Rows count as in the spreadsheet."
+        "Beyond {OUTLIER_CUT} robust standard deviations of a robust fit of geometry. Rows are numbered as in the spreadsheet."
     ));
     table
 }

@@ -115,17 +115,17 @@ pub(super) fn readout_fusion(found: &Identification) -> Block {
             Verdict::new(
                 Status::Good,
                 format!(
-                    "The Cartesian readout of the controller refined the rounded angles: their σ is {:.0} % of the rounding error",
+                    "The Cartesian read-out of the controller refined the rounded angles: their σ is {:.0} % of the rounding error",
                     100.0 * report.narrowed
                 ),
                 [
                     format!(
-                        "readout and nominal forward kinematics differ by {:.4} mm RMS with the logged angles; rounding explains {:.4} mm",
+                        "read-out and nominal forward kinematics differ by {:.4} mm RMS with the logged angles; rounding explains {:.4} mm",
                         report.before_mm, report.expected_mm
                     ),
                     format!("with refined angles they differ by {:.4} mm", report.after_mm),
                     format!(
-                        "the readout refers to the point ({:.3}, {:.3}, {:.3}) mm on the flange",
+                        "the read-out refers to the point ({:.3}, {:.3}, {:.3}) mm on the flange",
                         point.x, point.y, point.z
                     ),
                 ],
@@ -133,16 +133,16 @@ pub(super) fn readout_fusion(found: &Identification) -> Block {
             .into()
         }
         Err(NotFused::Nothing) => Block::Paragraph(
-            "Angles are used as logged: they are not rounded, some rows have no Cartesian readout, or its use was switched off."
+            "Angles are used as logged: they are not rounded, some rows have no Cartesian read-out, or its use was switched off."
                 .to_owned(),
         ),
         Err(NotFused::Mismatch { found_mm, expected_mm }) => Verdict::new(
             Status::Warning,
             format!(
-                "The Cartesian readout was not used: it differs by {found_mm:.3} mm RMS from the nominal arm at the logged angles, while \
-                 rounding explains {expected_mm:.3} mm"
+                "The Cartesian read-out was not used: it differs by {found_mm:.3} mm RMS from the nominal arm at the logged angles, while rounding \
+                 explains {expected_mm:.3} mm"
             ),
-            ["angles and readout of the same row contradict each other, or the robot is not the stated one"],
+            ["angles and read-out of the same row contradict each other, or the robot is not the stated one"],
         )
         .into(),
     }

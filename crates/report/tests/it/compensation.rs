@@ -291,16 +291,14 @@ fn verdict_and_page_tell_what_to_look_at() {
     let mut open = listing.clone();
     open.nc.unstated_lengths = vec![listing.motions[0].place];
     let text = terminal::document(&view::summary(&plan, &open, &files), 200);
-    assert!(text.contains("[warning] Corrected as if the length of the tool were active"), "{text}");
+    assert!(text.contains("[warning] Corrected as if the tool length were active"), "{text}");
     let last = listing.motions.len() as u32 - 1;
     for (call, is_depended_on) in [(0, true), (last, false)] {
         let mut called = listing.clone();
         called.nc.external_calls = vec![call];
         let text = terminal::document(&view::summary(&plan, &called, &files), 200);
         assert_eq!(
-            text.contains(
-                "[warning] Corrected, but a call of another program may change what holds behind it"
-            ),
+            text.contains("[warning] Corrected, but a call of another program may change the modal state"),
             is_depended_on,
             "{text}"
         );
@@ -399,7 +397,7 @@ fn work_objects_on_one_fixture_are_named_together() {
     plan.placements[0].others.clear();
     plan.placements.push(placement("wobj0", Placement::Shape, 1.5));
     let text = sentences(&plan, &listing).join("\n");
-    assert!(text.contains("against each other by up to 2.131 mm"), "{text}");
+    assert!(text.contains("relative to each other by up to 2.131 mm"), "{text}");
     plan.placements[1].held = true;
     assert!(!sentences(&plan, &listing).join("\n").contains("belong together"));
 }

@@ -10,7 +10,7 @@ use truegrind_calibration::identification::fit::Outlier;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
-use truegrind_calibration::identification::verdict::NOT_NOISE;
+use truegrind_calibration::identification::verdict::{NOT_NOISE, TARGET_NOT_SHOWN};
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_report::format::{csv, markdown, terminal};
 use truegrind_report::identification as view;
@@ -87,8 +87,7 @@ fn repeated_poses_that_show_more_than_noise_head_a_warning() {
 fn a_target_that_the_poses_do_not_show_is_in_the_headline() {
     let mut found = by_hand();
     found.estimated.verdict.status = Judgement::NotEvaluated;
-    found.estimated.verdict.reasons =
-        vec!["these poses, of one kind, do not show where the target sits on the flange: ...".to_owned()];
+    found.estimated.verdict.reasons = vec![format!("these poses, of one kind, {TARGET_NOT_SHOWN}: ...")];
     let text = terminal::document(&view::summary(&found), 400);
     assert!(text.contains("frames alone; errors are those of the target"), "{text}");
 }
@@ -289,7 +288,7 @@ fn a_contradicting_read_out_is_a_warning() {
     found.readout_fusion = Err(NotFused::Mismatch { found_mm: 4.2, expected_mm: 0.6 });
     let text = terminal::document(&view::document(&found, identification().1), 200);
     assert!(
-        text.contains("[warning] The Cartesian readout was not used: it differs by 4.200 mm RMS"),
+        text.contains("[warning] The Cartesian read-out was not used: it differs by 4.200 mm RMS"),
         "{text}"
     );
     assert_eq!(view::json(&found, identification().1)["sharpening"]["found_mm"], 4.2);

@@ -231,16 +231,16 @@ impl FittedLinks {
     /// +1 or −1 where axes 2 and 3 are parallel or antiparallel.
     ///
     /// # Errors
-    /// Where they are neither, since then no joint is counted against the ground.
+    /// Where they are neither, since then no joint is measured relative to the ground.
     pub(super) fn parallel_2_3(&self, file: &str) -> Result<f64, RobotError> {
         let along = self.directions[1].dot(&self.directions[2]);
         if along.abs() < 1.0 - 1e-4 {
             return Err(foreign_error(
                 file,
-                "joint 3 against the ground",
+                "joint 3 relative to the ground",
                 format!("axes 2 and 3 at {:.2}° to each other", along.clamp(-1.0, 1.0).acos().to_degrees()),
                 "parallel axes 2 and 3",
-                "leave it out: such an arm counts no joint against the ground",
+                "leave the option out: in such an arm no joint is measured relative to the ground",
             ));
         }
         Ok(along.signum())

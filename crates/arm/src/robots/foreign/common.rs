@@ -10,7 +10,7 @@ pub struct ImportOptions {
     pub base: Option<String>,
     /// The flange link; `tool0` or `flange` if omitted and present.
     pub tip: Option<String>,
-    /// Joint 3 is counted against the ground, independent of joint 2, as FANUC controllers do.
+    /// Joint 3 is measured relative to the ground, independent of joint 2, as FANUC controllers do.
     pub ground_joint_3: bool,
 }
 

@@ -3,7 +3,7 @@
 //! One row for each joint, from the base on. Columns by name, in any order: `convention` (`standard` or `modified`), `theta_deg`,
 //! `d_mm`, `a_mm`, `alpha_deg`, or in `_rad` and `_m`; where known `min_deg`, `max_deg`, `speed_deg_s`; and `q1` to `q6`, how far
 //! the row's link turns for a turn of each joint of the controller, where that is more than one for one (the sign of a joint, or a
-//! joint 3 that is counted against the ground: 1 under its own and −1 under `q2`).
+//! joint 3 that is measured relative to the ground: 1 under its own and −1 under `q2`).
 //!
 //! Standard: T = Rz(theta) Tz(d) Tx(a) Rx(alpha). Modified: T = Rx(alpha) Tx(a) Rz(theta) Tz(d), with alpha and a of the link
 //! before; Craig, Introduction to Robotics, eq. 3.6.
@@ -56,7 +56,7 @@ impl<'a> Table<'a> {
                 "table",
                 format!("{} rows", table.rows.len()),
                 "six, one for each joint from the base on",
-                "truegrind knows arms with six rotary axes; a fixed flange is no row, add it to d and theta of the last",
+                "truegrind supports arms with six rotary axes; a fixed flange is not a row: add it to d and theta of the last row",
             ));
         }
         let width = table.header.len();

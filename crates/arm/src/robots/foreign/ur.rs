@@ -137,7 +137,7 @@ pub(super) fn read_conf(
             "robot",
             "nothing",
             "a line such as `robot = universal-robots-ur10` above the first section",
-            "the file holds deviations from the maker's table and does not say of which arm: write it there",
+            "the file contains deviations from the maker's table and does not say for which arm: write the arm there",
         ));
     };
     let nominal = load(&name)?.model;

@@ -326,14 +326,14 @@ impl<'a> Tree<'a> {
             [] => Err(foreign_error(
                 self.file,
                 "joints",
-                "no link that stands",
+                "no link without a parent",
                 "one root",
-                "a tree begins at a link that is no child",
+                "a tree begins at a link that is not a child",
             )),
             several => Err(foreign_error(
                 self.file,
                 "links",
-                format!("{} links that stand: {}", several.len(), several.join(", ")),
+                format!("{} links without a parent: {}", several.len(), several.join(", ")),
                 "one root",
                 "say which one is the base (--base)",
             )),
@@ -390,7 +390,7 @@ impl<'a> Tree<'a> {
                     self.file,
                     "tip",
                     found,
-                    "a link behind the base",
+                    "a link after the base",
                     "give base and tip of one arm",
                 )
             })?;
@@ -476,8 +476,8 @@ impl<'a> Tree<'a> {
             "joints",
             found,
             "six joints that turn",
-            "truegrind knows arms with six rotary axes; where a gripper or a track is among them, --base and --tip say where \
-             the arm begins and ends",
+            "truegrind supports arms with six rotary axes; where a gripper or a track is among them, --base and --tip say where the arm begins and \
+             ends",
         )
     }
 
@@ -516,7 +516,7 @@ impl<'a> Tree<'a> {
                     self.file,
                     "flange",
                     format!(
-                        "{} links behind joint {}: {}",
+                        "{} links after joint {}: {}",
                         several.len(),
                         self.joints[end].name,
                         several.join(", ")
@@ -572,7 +572,7 @@ impl<'a> Tree<'a> {
             .then(|| limits.map(|range| range.map_or([-360.0, 360.0], |range| range.map(f64::to_degrees))));
         if limits_deg.is_some() && !unlimited.is_empty() {
             notes.push(format!(
-                "no range is stated of {}: one turn either way is taken",
+                "no range is stated of {}: one turn in each direction is assumed",
                 unlimited.join(", ")
             ));
         }
@@ -581,11 +581,11 @@ impl<'a> Tree<'a> {
         notes.push(match &masses {
             Some(masses) => {
                 format!(
-                    "masses are taken: {:.1} kg behind the base",
+                    "masses are used: {:.1} kg in the six moving links",
                     masses.iter().map(|body| body.mass_kg).sum::<f64>()
                 )
             }
-            None => "masses are not stated of every link, and not taken".to_owned(),
+            None => "not every link states a mass, so no masses are used".to_owned(),
         });
         if self.meshes > 0 {
             notes.push(format!(
@@ -595,8 +595,8 @@ impl<'a> Tree<'a> {
         }
         if maker == "FANUC" {
             notes.push(
-                "FANUC controllers count joint 3 against the ground, URDF files count it against link 2: where the log is the \
-                 controller's, say --ground-joint-3"
+                "FANUC controllers measure joint 3 relative to the ground, URDF files relative to link 2: if the log is from the controller, give \
+                 --ground-joint-3"
                     .to_owned(),
             );
         }

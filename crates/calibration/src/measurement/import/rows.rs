@@ -140,7 +140,11 @@ fn check_outlets(reader: &Reader<'_>, columns: &HeaderColumns, rows: &[Row]) -> 
         return Ok(());
     }
     let (column, what, remedy) = if columns.station.is_some() {
-        ("station", "stations", "each station adds six unknowns: `session` names rows of one station")
+        (
+            "station",
+            "stations",
+            "each station adds six unknowns; to label rows taken from one station, use the column `session`",
+        )
     } else {
         let remedy = "each outlet adds four unknowns: put the rows of further outlets into other files";
         ("anchor", "cable outlets", remedy)
@@ -234,7 +238,7 @@ impl Reader<'_> {
             }
             Some(Cell::Text(text)) if text.contains(',') => {
                 let remedy = if self.sheet.is_some() {
-                    "this cell holds text: turn it into a number"
+                    "this cell contains text: turn it into a number"
                 } else {
                     "write it with a decimal point (a decimal comma needs columns separated by semicolons)"
                 };
@@ -383,7 +387,7 @@ impl Reader<'_> {
                 sample,
                 0.0,
                 "the number of a sampling point",
-                "count the sampling points along the path, alike in each cycle",
+                "count the sampling points along the path, the same in each cycle",
             )?,
         }))
     }
@@ -461,7 +465,7 @@ fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), 
             "q1 to q6",
             format!("no angle exceeds {largest_deg:.3}: these look like radians"),
             "degrees",
-            "convert the angles to degrees, or allow odd units (--allow-odd-units) if the arm did move so little",
+            "convert the angles to degrees, or allow odd units (--allow-odd-units) if the arm really moved so little",
         );
     }
     let Some(spread_mm) = spread(rows) else { return Ok(()) };
@@ -474,7 +478,7 @@ fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), 
                 "the readings span {spread_mm:.4} while joints turn by {spread_deg:.0}°: these look like metres"
             ),
             "millimetres",
-            "multiply the readings by 1000, or allow odd units (--allow-odd-units) if the readings did change so little",
+            "multiply the readings by 1000, or allow odd units (--allow-odd-units) if the readings really changed so little",
         );
     }
     let readout = Row::readout_mm;

@@ -28,7 +28,7 @@ const OUTLET: &str =
 const READOUT: &str =
     "position as the controller shows it (mm, may be empty); it refines rounded joint angles";
 const APPROACH: &str =
-    "side from which each joint arrived, −1 or +1 (may be empty); it tells backlash from other errors";
+    "side from which each joint arrived, −1 or +1 (may be empty); it separates backlash from other errors";
 const PATH: &str = "for rows read while the arm runs a path, which `accept` judges: any name, which run (from 1), which sampling point \
                     (may be empty)";
 

@@ -57,7 +57,7 @@ pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
         let mut budget = Budget { cells: MOST_CELLS, text: MOST_TEXT };
         names.iter().map(|name| table(file, &mut workbook, name, &mut budget)).collect()
     }));
-    read.unwrap_or_else(|_| Err(fail("a number in it contradicts another".to_owned())))
+    read.unwrap_or_else(|_| Err(fail("its contents contradict each other".to_owned())))
 }
 
 /// Cells and text that are left of the limits.
@@ -73,7 +73,7 @@ impl Budget {
             return Err(ImportError::TooLarge {
                 location: location.clone(),
                 found: format!(
-                    "more than {MOST_CELLS} cells (the empty ones before a used one counted in) or {} MB of text",
+                    "more than {MOST_CELLS} cells (including empty ones before a used one) or {} MB of text",
                     MOST_TEXT >> 20
                 )
                 .into(),

@@ -207,7 +207,7 @@ fn another_series_judges_the_written_arm() {
 }
 
 /// Another measurement of an arm that is not as it was fitted is no number beside a good verdict: a joint that has moved since, a joint that
-/// counts the other way, another arm of the type.
+/// has the opposite sign, another arm of the type.
 #[test]
 fn another_measurement_says_that_the_arm_was_another() {
     let all = run(&arm(), &[], &setup(400, 61)).dataset;
@@ -229,7 +229,7 @@ fn another_measurement_says_that_the_arm_was_another() {
     let (status, said) = with(&|row| row.joints[1] += 0.1_f64.to_radians());
     assert!(status == Judgement::Doubtful && said.contains("has changed"), "{status:?} {said}");
     let (status, said) = with(&|row| row.joints[3] *= -1.0);
-    assert!(status == Judgement::Fail && said.contains("counts the other way"), "{status:?} {said}");
+    assert!(status == Judgement::Fail && said.contains("has the opposite sign"), "{status:?} {said}");
     let another = run(&arm(), &[], &setup(200, 62)).dataset;
     let mut judged = found.clone();
     judged.test_on(&another, &frames(&another, &arm()), &tolerance, true);
