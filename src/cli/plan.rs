@@ -132,7 +132,7 @@ pub(super) struct Arguments {
     /// Speed between poses (mm/s).
     #[arg(long, value_name = "MM/S", default_value_t = 200.0)]
     speed: f64,
-    /// Non-centrality above which an effect counts as detectable.
+    /// Non-centrality above which an effect counts as detectable (a shift, whose rows are unknown: four times this).
     #[arg(long, default_value_t = Options::default().decisive)]
     decisive: f64,
     /// Number of random candidate poses.
