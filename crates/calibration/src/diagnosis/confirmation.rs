@@ -21,7 +21,7 @@ use super::candidates::Scored;
 use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::cause_kind::CauseKind;
-use super::design::{Design, FullDesign, Linear, Projected};
+use super::design::{Design, FullDesign, Linear, Projected, side_by_side};
 use super::discrepancy::{Discrepancy, Functions};
 use super::elimination::{Criteria, Eliminated, Significance, Tested, eliminate};
 use super::extension::{Extended, Subject};
@@ -424,12 +424,29 @@ impl<'a> Half<'a> {
             .zip(&projected)
             .enumerate()
             .map(|(k, (tried, projected))| {
-                let dropped: Vec<usize> = removed.iter().copied().filter(|o| *o != k).chain([k]).collect();
+                let accepted = &self.confirming.accepted;
+                // Terms of one finding share what it explains, and may each be too weak: they are asked together.
+                let terms = terms_of(k, own, removed);
+                let together = (terms.len() > 1).then(|| {
+                    let columns: Vec<DMatrix<f64>> = terms.iter().map(|&j| columns[j].clone()).collect();
+                    whole.design.project_all(&[side_by_side(&columns, self.linear.residual.len())])
+                });
+                let projected = together.as_ref().and_then(|all| all.first()).unwrap_or(projected);
+                let sizes: Vec<f64> = terms.iter().flat_map(|&j| own[j].candidate.cause.sizes()).collect();
+                let before = terms
+                    .iter()
+                    .flat_map(|&j| accepted[j].own.estimate.iter().copied())
+                    .collect::<Vec<f64>>();
+                let before = &DVector::from_vec(before);
+                let accepted = &accepted[k];
+                let dropped: Vec<usize> = removed
+                    .iter()
+                    .copied()
+                    .filter(|o| !terms.contains(o))
+                    .chain(terms.iter().copied())
+                    .collect();
                 let design = whole.without(&self.confirming.parameter_indices(&dropped));
-                let accepted = &self.confirming.accepted[k];
-                let sizes = tried.candidate.cause.sizes();
                 let score = score_from(design.gradient_and_information(projected), &sizes, accepted.tried);
-                let before = &accepted.own.estimate;
                 let lambda = |v: &DVector<f64>| (v.transpose() * &score.information * v)[0].max(0.0);
                 if lambda(before) < DETECTABLE {
                     return None;
@@ -581,6 +598,15 @@ impl<'c> Remaining<'c> {
         }
         true
     }
+}
+
+/// The causes of the finding of cause `k`; a shift is judged by itself.
+fn terms_of(k: usize, own: &[WithColumns], removed: &[usize]) -> Vec<usize> {
+    let cause = |j: usize| &own[j].candidate.cause;
+    let is_term = |&j: &usize| {
+        j == k || cause(k).rows().is_none() && cause(j).is_same_finding(cause(k)) && !removed.contains(&j)
+    };
+    (0..own.len()).filter(is_term).collect()
 }
 
 /// Whether a cause is not in the pool.
