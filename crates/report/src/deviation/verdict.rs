@@ -105,8 +105,8 @@ fn of_certainty(report: &PathReport, risk: Risk) -> Option<Reason> {
     let (sigma, rms) = (report.sigma_rms_mm()?, rms(report, BEFORE)?);
     (risk == Risk::Unstated && sigma > rms && only_shape(report).is_none()).then(|| {
         let words = format!(
-            "{}: the predicted 1σ, {sigma:.3} mm, exceeds the deviation to correct, {rms:.3} mm RMS: see with what probability it helps here \
-             in the report of `truegrind compensate`",
+            "{}: the predicted 1σ, {sigma:.3} mm, exceeds the deviation to correct, {rms:.3} mm RMS: `truegrind compensate` states with what \
+             probability the correction makes it worse",
             report.model
         );
         (Status::Warning, words)
