@@ -581,7 +581,7 @@ fn a_program_that_differs_by_more_than_a_correction_fails_with_its_lines() {
 fn the_map_of_an_expected_deviation_shows_sizes() {
     let map = |after: After| {
         let page = html::document(&view::document(&[raster("m", after, 1e-4)]));
-        page.split_once("Where on the part").unwrap().1.split_once("</svg>").unwrap().0.to_owned()
+        page.split_once("Where on the part").unwrap().1.split_once("</figure>").unwrap().0.to_owned()
     };
     let (expected, achieved) = (map(After::PredictedRemainder), map(After::Achieved));
     assert!(expected.contains("size of the deviation") && !expected.contains("along the normal"));
