@@ -252,7 +252,7 @@ def test_errors_name_the_place():
 
     with pytest.raises(tg.DatasetError) as raised:
         tg.Dataset.from_dataframe({"q1": [1.0], "length": [2.0]})
-    assert raised.value.row is None and "column q2 is missing" in raised.value.expected
+    assert raised.value.row is None and "columns q2, q3, q4, q5 and q6 are missing" in raised.value.expected
 
 
 @pytest.mark.parametrize(

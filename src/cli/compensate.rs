@@ -81,6 +81,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     }
     let (cell, surface, condition) = arguments.cell.read(corrector.map(|c| c.arm))?;
     robot_match::refuse_other_cell(&cell, &robot, &nominal)?;
+    let is_rapid = |path: &PathBuf| Language::by_name(&files::name(path)) == Some(Language::Rapid);
+    if jobs.iter().flat_map(|job| &job.paths).any(is_rapid)
+        && let Ok(sheet) = inputs::robot(stated.unwrap_or(robot.as_str().into()))
+    {
+        robot_match::note_other_language(&sheet);
+    }
     let options = arguments.options(condition, jobs.len());
     let mut setup = programs::setup(&cell, stated.or(Some(robot.as_str().into())));
     let single = matches!(jobs.as_slice(), [job] if job.under.is_none() || job.paths.len() > 1);

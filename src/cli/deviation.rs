@@ -401,6 +401,15 @@ fn refuse_other_original(name: &str, task: &Listing, original: Option<&Listing>)
         }
         return Ok(());
     };
+    if let Some(mark) = original.marks.iter().flatten().next() {
+        let is_swapped = task.marks.iter().all(Option::is_none);
+        let swapped = if is_swapped {
+            "the two programs are swapped"
+        } else {
+            "give the program before any correction"
+        };
+        bail!("{name}: the program of --intended is itself corrected (with model {}): {swapped}", mark.model);
+    }
     // Rewriting inserts motions and removes none.
     let [moves, intended] = [task, original].map(|listing| listing.motions.len());
     if moves < intended {

@@ -20,6 +20,7 @@ use super::computation::{Common, watching};
 use super::exit_status::ExitStatus;
 use super::files::Batch;
 use super::identify::{DataArguments, FitArguments, PointsArguments, read, write_model};
+use super::output_extension;
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::shares::Shares;
@@ -77,6 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut given: Vec<&std::path::Path> = arguments.data.files();
     given.extend(arguments.also.iter().map(PathBuf::as_path));
     Batch::check(&given, &targets)?;
+    arguments.output.as_deref().map_or(Ok(()), output_extension::refuse_no_model)?;
     let options = options(arguments)?;
     let (robot, dataset) = read(&arguments.data)?;
     let name = robot.sheet.name.clone();

@@ -110,7 +110,10 @@ fn jobs(arguments: &Arguments) -> anyhow::Result<Vec<Job>> {
     };
     for path in std::iter::once(&arguments.data.data).chain(&arguments.more) {
         if path.is_dir() {
-            let found = found_below(path, is_table)?;
+            let found = found_below(path, |path| is_table(path) || is_other_workbook(path))?;
+            let (passed, found): (Vec<_>, Vec<_>) =
+                found.into_iter().partition(|path| is_lock(path) || is_other_workbook(path));
+            passed.iter().for_each(|path| print_message(format_args!("note: {}", why_passed(path))));
             jobs.extend(found.into_iter().map(|file| Job { paths: vec![file], under: Some(path.clone()) }));
         } else {
             jobs.push(Job { paths: vec![path.clone()], under: None });
@@ -123,6 +126,29 @@ fn jobs(arguments: &Arguments) -> anyhow::Result<Vec<Job>> {
         bail!("no measurements found: folders are searched for .csv and .xlsx");
     }
     Ok(jobs)
+}
+
+/// Whether Excel made this file beside a workbook that is open in it.
+fn is_lock(path: &Path) -> bool {
+    files::name(path).starts_with("~$")
+}
+
+/// Whether it is a workbook of a kind that is not read.
+fn is_other_workbook(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|e| ["xls", "xlsb", "xlsm", "ods"].iter().any(|other| e.eq_ignore_ascii_case(other)))
+}
+
+/// Why a file below a folder is no arm.
+fn why_passed(path: &Path) -> String {
+    match files::name(path).strip_prefix("~$") {
+        Some(open) => {
+            format!("{}: {open} is open in Excel, so only what was saved of it is read", path.display())
+        }
+        None => {
+            format!("{}: passed over, since only .csv and .xlsx are read; save it as XLSX", path.display())
+        }
+    }
 }
 
 /// Path of the model of an arm in the output folder.
@@ -220,7 +246,7 @@ fn diagnose_arm(
     let poor = matches!(found.estimated.verdict.status, Judgement::Fail | Judgement::Doubtful);
     let unexplained = diagnosis.is_partly_unexplained();
     let note = reason.filter(|_| arguments.output.is_some()).map(|reason| format!("the model {reason}"));
-    let row = Row::of(job.name(), output, note, diagnosis);
+    let row = Row::of(job.name(), output, note, &found);
     Ok((ArmResult { row, notes, clean: !poor && !unexplained }, written))
 }
 

@@ -28,6 +28,7 @@ use super::computation::{Common, on_threads, watching};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs::{self, NamedRobot, UrdfLinks};
+use super::output_extension;
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::stated_frames::{FramePriorArguments, Stated, StatedFrameArguments};
@@ -234,6 +235,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut targets = arguments.outputs.files();
     targets.extend(arguments.output.as_deref());
     Batch::check(&arguments.data.files(), &targets)?;
+    arguments.output.as_deref().map_or(Ok(()), output_extension::refuse_no_model)?;
     if !(0.0..=0.9).contains(&arguments.held_out) || arguments.held_out == 0.0 {
         bail!("--held-out {}: expected a share above 0, up to 0.9", arguments.held_out);
     }

@@ -7,6 +7,7 @@ use clap::Args;
 use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
+use truegrind::programs::reading::Language;
 use truegrind::robots::foreign::{ImportOptions, ImportedRobot, Kind, import};
 use truegrind::robots::{self, Robot};
 
@@ -107,6 +108,11 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     let path = Path::new(argument);
     let text = files::read_text(path)?;
     let arm = Estimated::from_toml(&text).map_err(|e| {
+        if let Some(other) = other_kind(&text) {
+            return anyhow!(
+                "{argument}: {other}; expected a model file as written by `truegrind identify -o`"
+            );
+        }
         anyhow!(
             "{argument}: {}; expected a model file as written by `truegrind identify -o`",
             e.to_string().trim_end()
@@ -121,6 +127,32 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     }
     let hash = hash(text.as_bytes());
     Ok(NamedModel::Estimated { name: files::name(path), hash, arm: Box::new(arm) })
+}
+
+/// What a file is that is no model, where another option reads it.
+fn other_kind(text: &str) -> Option<&'static str> {
+    let keys = toml::from_str::<toml::Table>(text).ok()?;
+    let has = |key: &str| keys.contains_key(key);
+    if has("schema") {
+        None
+    } else if has("joint_map") && has("link") {
+        Some("this is a simulated arm, which --actual reads")
+    } else if has("tool") || has("wobj") {
+        Some("this is a cell file, which --cell reads")
+    } else {
+        None
+    }
+}
+
+/// Refuses a program, by its name, where a file of another kind is read: the parser of that would complain about its first line.
+pub(super) fn refuse_program(path: &Path, expected: &str) -> anyhow::Result<()> {
+    match Language::by_name(&files::name(path)) {
+        Some(Language::Rapid) => {
+            bail!("{}: this is a RAPID program; expected {expected} (.toml)", path.display())
+        }
+        Some(Language::Nc) => bail!("{}: this is an NC program; expected {expected} (.toml)", path.display()),
+        None => Ok(()),
+    }
 }
 
 /// Refuses a doubtful model unless allowed, in which case a note is printed.

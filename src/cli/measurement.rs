@@ -43,8 +43,8 @@ struct Template {
 enum Reads {
     /// Length of a draw-wire cable.
     Cable,
-    /// Position of a reflector or marker.
-    #[value(alias = "tracker")]
+    /// Position of a reflector or marker. `tracker` and `camera` mean the same.
+    #[value(alias = "tracker", alias = "camera")]
     Position,
     /// Position and orientation of a target.
     Pose,

@@ -27,6 +27,18 @@ fn language_of(output: &Path) -> anyhow::Result<Option<Language>> {
     }
 }
 
+/// Refuses an output with the extension of another kind of file for a model.
+pub(super) fn refuse_no_model(output: &Path) -> anyhow::Result<()> {
+    match output.extension().filter(|extension| !extension.eq_ignore_ascii_case("toml")) {
+        Some(extension) => bail!(
+            "{}: a model file is TOML: expected the extension .toml, not .{}",
+            output.display(),
+            extension.to_string_lossy()
+        ),
+        None => Ok(()),
+    }
+}
+
 /// Refuses an output with an unknown extension.
 pub(super) fn refuse_unknown(output: &Path) -> anyhow::Result<()> {
     language_of(output).map(drop)

@@ -17,6 +17,7 @@ use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs::{self, UrdfLinks};
 use super::output_extension;
+use super::robot_match;
 use super::terminal::print_message;
 use truegrind::compensation::cell::nc_setup::angle_convention;
 
@@ -67,6 +68,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     batch.add(&arguments.output, bytes);
     batch.write()?;
     report_toolpath(&path, &robot, &arguments.output);
+    if Language::by_name(&files::name(&arguments.output)) != Some(Language::Nc) {
+        robot_match::note_other_language(&robot);
+    }
     Ok(ExitStatus::Done)
 }
 
@@ -90,6 +94,7 @@ fn report_toolpath(path: &Toolpath, robot: &Robot, output: &Path) {
 pub(super) fn surface(path: &Path) -> anyhow::Result<SurfaceFile> {
     let bytes = files::read(path)?;
     let name = path.display().to_string();
+    inputs::refuse_program(path, "a surface file")?;
     let resolve = |mesh: &str| inputs::read_beside(path, mesh).map_err(|e| format!("{e:#}"));
     SurfaceFile::read(&name, &bytes, resolve).map_err(|e| anyhow!("{e}"))
 }

@@ -33,8 +33,8 @@ use super::terminal::print_message;
 enum SensorArgument {
     /// Draw-wire encoder: length.
     Cable,
-    /// Tracker with a reflector: position.
-    #[value(alias = "tracker")]
+    /// Tracker with a reflector, or a camera: position. `tracker` and `camera` mean the same.
+    #[value(alias = "tracker", alias = "camera")]
     Position,
     /// Tracker with a 6D target: pose.
     Pose,

@@ -36,6 +36,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Batch::check(&[&arguments.recipe], &targets)?;
     let text = files::read_text(&arguments.recipe)?;
     let name = arguments.recipe.display().to_string();
+    inputs::refuse_program(&arguments.recipe, "a recipe")?;
     let Recipe { about, conditions, .. } = Recipe::parse(&text, &name)?;
     let simulation = simulation(&text, &name, arguments.seed)?;
     let mut batch = Batch::sparing([&arguments.recipe]);

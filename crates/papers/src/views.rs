@@ -158,6 +158,14 @@ pub fn list(experiments: &[Experiment]) -> Document {
 fn opening(experiment: &Experiment, results: &Results) -> Document {
     let mut page = Document::new(experiment.title.clone());
     page.subtitle = format!("{}: {}", experiment.paper, experiment.figures.join(", "));
+    if let Results::Methods(study) = results
+        && study.reduced
+    {
+        page.subtitle.push_str(&format!(
+            " – reduced protocol: {} rows instead of {}",
+            study.rows, study.methods.protocol.rows
+        ));
+    }
     if !experiment.about.is_empty() {
         page.paragraph(experiment.about.clone());
     }

@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, HashMap};
 use serde_json::{Value, json};
 
 use self::verdict::key_figures;
-use super::deviation::{sections, status_cell, status_word};
+use super::deviation::{Risk, sections, status_cell, status_word};
 use super::document::{Block, Document};
 use super::placement;
 use super::table::{Cell, Column, Table};
@@ -232,9 +232,10 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
         page.push(cuts);
     }
     if !plan.notes.is_empty() {
-        page.heading(2, "Tools and work objects");
+        page.heading(2, "Notes");
         page.push(Block::List(plan.notes.clone()));
     }
+    let risk = if plan.probability_of_harm.is_some() { Risk::Stated } else { Risk::Unstated };
     let mut programs: Vec<&str> = Vec::new();
     for report in reports {
         if programs.contains(&report.program.as_str()) {
@@ -243,7 +244,7 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
         programs.push(&report.program);
         let of: Vec<&PathReport> = reports.iter().filter(|r| r.program == report.program).collect();
         page.heading(2, format!("Deviation of {}", report.program));
-        page.blocks.extend(sections(&of, 3));
+        page.blocks.extend(sections(&of, 3, risk));
     }
     page.heading(2, "Motions");
     page.push(page_table(plan, listing, files));

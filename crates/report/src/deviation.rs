@@ -11,9 +11,12 @@ mod pictures;
 mod summary;
 mod verdict;
 
+use std::collections::BTreeSet;
+
 use serde_json::{Value, json};
 
 use self::side::{AFTER, BEFORE, Side, by_program, has, intended};
+pub(super) use self::verdict::Risk;
 use self::verdict::{size, verdict};
 use self::words::{decimals, meaning, named, notes, words};
 use super::document::{Block, Document, KeyFigure};
@@ -193,6 +196,15 @@ pub fn short_table(report: &PathReport) -> Table {
         columns.push(Column::number(format!("{key}_turn_deg"), format!("{side} turn"), "°", 3));
     }
     columns.push(Column::number("sigma_mm", "1σ", "mm", 3));
+    // Approaches have the σ of their place, cuts that of their shape.
+    let kinds: BTreeSet<bool> = report
+        .points
+        .iter()
+        .filter(|point| point.sigma_mm.is_some())
+        .map(PathPoint::is_sigma_of_shape)
+        .collect();
+    let is_of_two_kinds = kinds.len() > 1;
+    columns.extend(is_of_two_kinds.then(|| Column::text("sigma_of", "1σ of")));
     columns.push(Column::text("status", "Status"));
     columns.push(Column::text("reason", "Reason"));
     let mut table = Table::new(format!("Points of {} under {}", report.program, named(report)), columns);
@@ -205,7 +217,10 @@ pub fn short_table(report: &PathReport) -> Table {
             }
             row.push(side.map(|d| d.angle_rad.to_degrees()).into());
         }
-        row.extend(outcome(point));
+        let [sigma, status, reason] = outcome(point);
+        row.push(sigma);
+        row.extend(is_of_two_kinds.then(|| sigma_of(point).into()));
+        row.extend([status, reason]);
         table.push(row);
     }
     table.notes = notes(report);
@@ -261,7 +276,7 @@ pub fn summary(name: &str, reports: &[PathReport]) -> Document {
     let mut page = Document::new(format!("Deviation of {name}"));
     let programs = by_program(reports);
     for (program, reports) in programs.iter().take(MAX_VERDICTS) {
-        let mut verdict = verdict(reports);
+        let mut verdict = verdict(reports, Risk::Unstated);
         if programs.len() > 1 {
             verdict.headline = format!("{program}: {}", verdict.headline);
         }
@@ -275,7 +290,10 @@ pub fn summary(name: &str, reports: &[PathReport]) -> Document {
 /// The worst status of all programs; the status of the exit code.
 pub fn status(reports: &[PathReport]) -> Status {
     let worst = |a: Status, b: Status| if severity(b) > severity(a) { b } else { a };
-    by_program(reports).iter().map(|(_, reports)| verdict(reports).status).fold(Status::Good, worst)
+    by_program(reports)
+        .iter()
+        .map(|(_, reports)| verdict(reports, Risk::Unstated).status)
+        .fold(Status::Good, worst)
 }
 
 /// How bad a status is. Without a corrected path there is nothing to be judged, which is no fault.
@@ -315,17 +333,17 @@ pub fn document(reports: &[PathReport]) -> Document {
         if programs.len() > 1 {
             page.heading(2, *program);
         }
-        page.blocks.extend(sections(reports, if programs.len() > 1 { 3 } else { 2 }));
+        page.blocks.extend(sections(reports, if programs.len() > 1 { 3 } else { 2 }, Risk::Unstated));
     }
     page
 }
 
 /// The blocks of one program, with headings at `level`; also part of the page on its compensation.
-pub(super) fn sections(reports: &[&PathReport], level: u8) -> Vec<Block> {
+pub(super) fn sections(reports: &[&PathReport], level: u8, risk: Risk) -> Vec<Block> {
     let mut page = Document::default();
     let Some(first) = reports.first() else { return page.blocks };
-    page.push(verdict(reports));
-    page.push(key_figures(reports));
+    page.push(verdict(reports, risk));
+    page.push(key_figures(reports, risk));
     page.push(summary::block(reports, false));
     page.push(summary::registered(reports, false));
     page.heading(level, "Along the path");
@@ -491,7 +509,8 @@ pub(super) fn status_word(status: MotionStatus) -> &'static str {
     }
 }
 
-fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
+/// The cards; beside the report on a correction those without what it states itself.
+fn key_figures(reports: &[&PathReport], risk: Risk) -> Vec<KeyFigure> {
     let mut figures = Vec::new();
     let block = |report: &PathReport, side: Side| report.block(side);
     let mean = |report: &PathReport, side: Side| {
@@ -500,14 +519,15 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
             .map_or_else(String::new, |b| format!(", mean |d| {:.3} mm{along}", b.all.mean_absolute))
     };
     let max = |report: &PathReport, side: Side| block(report, side).map(|block| block.all.max);
-    if let Some(first) = reports.first() {
+    let own = risk == Risk::Unstated;
+    if let Some(first) = reports.first().filter(|_| own) {
         // Along the normal only beside a deviation after that is so too: the expected one has no direction.
         let before =
             if has(first, AFTER) && first.expected_mm().is_none() { max(first, BEFORE) } else { size(first) };
         let note = format!("uncorrected{}", mean(first, BEFORE));
         figures.push(KeyFigure::new("Largest before", before, 3, "mm").note(note));
     }
-    for report in reports.iter().filter(|report| has(report, AFTER)).take(MODELS_IN_FIGURES) {
+    for report in reports.iter().filter(|report| own && has(report, AFTER)).take(MODELS_IN_FIGURES) {
         let (label, after, note) = match report.after {
             After::Achieved => {
                 ("Largest after", max(report, AFTER), format!("achieved{}", mean(report, AFTER)))

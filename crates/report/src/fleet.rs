@@ -1,6 +1,6 @@
 //! Report over many arms: one row per arm with its causes, ranked by possible gain.
 //!
-//! The gain is the held-out error of the nominal links minus that of the extended model: the error that correction can remove.
+//! The gain is the held-out error of the nominal links minus that of the written arm: what its user gets, without causes that are uncertain.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,8 @@ use super::kept;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_calibration::diagnosis::cause_kind::CauseKind;
-use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, NoiseFloorSource};
+use truegrind_calibration::diagnosis::diagnose::Diagnosed;
+use truegrind_calibration::diagnosis::finding::{Confidence, NoiseFloorSource};
 
 /// A cause found for an arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,6 +52,9 @@ pub struct Row {
     /// Held-out error with causes (mm RMSE).
     #[serde(with = "kept::optional")]
     pub extended_mm: Option<f64>,
+    /// Held-out error of the written arm, which lacks uncertain causes (mm RMSE).
+    #[serde(with = "kept::optional")]
+    pub written_mm: Option<f64>,
     /// Scatter of repeated poses (mm); rounding of the log alone is far below what a sensor scatters.
     #[serde(with = "kept::optional")]
     pub noise_floor_mm: Option<f64>,
@@ -66,7 +70,8 @@ pub struct Row {
 
 impl Row {
     /// The row of a diagnosed arm; `note`: remark on its model.
-    pub fn of(file: String, output: Option<String>, note: Option<String>, found: &Diagnosis) -> Row {
+    pub fn of(file: String, output: Option<String>, note: Option<String>, diagnosed: &Diagnosed) -> Row {
+        let found = &diagnosed.diagnosis;
         let fits = &found.fits;
         let causes = found.findings.iter().map(|finding| Cause {
             effect: finding.effect,
@@ -83,6 +88,7 @@ impl Row {
             nominal_mm: Some(fits.nominal.cv_rmse_mm),
             geometric_mm: Some(fits.geometric.cv_rmse_mm),
             extended_mm: Some(fits.extended.cv_rmse_mm),
+            written_mm: Some(diagnosed.estimated.geometry.held_out.rmse),
             noise_floor_mm: found
                 .noise_floor_mm
                 .filter(|_| found.noise_floor_source != NoiseFloorSource::RoundingAlone),
@@ -102,6 +108,7 @@ impl Row {
             nominal_mm: None,
             geometric_mm: None,
             extended_mm: None,
+            written_mm: None,
             noise_floor_mm: None,
             causes: Vec::new(),
             output: None,
@@ -110,9 +117,9 @@ impl Row {
         }
     }
 
-    /// Possible gain: held-out error of the nominal links minus that of the extended model (mm).
+    /// Possible gain: held-out error of the nominal links minus that of the written arm (mm).
     pub fn to_gain_mm(&self) -> Option<f64> {
-        Some(self.nominal_mm? - self.extended_mm?)
+        Some(self.nominal_mm? - self.written_mm?)
     }
 
     /// The cause with the largest effect on the readings; identified causes come first.
@@ -179,7 +186,8 @@ pub fn table(rows: &[Row]) -> Table {
             (Column::count("rows", "Rows"), |(row, _)| (!row.failed).then_some(row.rows).into()),
             (Column::number("nominal_mm", "Data sheet", "mm", 3), |(row, _)| row.nominal_mm.into()),
             (Column::number("geometric_mm", "Geometry", "mm", 3), |(row, _)| row.geometric_mm.into()),
-            (Column::number("extended_mm", "With causes", "mm", 3), |(row, _)| row.extended_mm.into()),
+            (Column::number("extended_mm", "All causes found", "mm", 3), |(row, _)| row.extended_mm.into()),
+            (Column::number("written_mm", "Written model", "mm", 3), |(row, _)| row.written_mm.into()),
             (Column::number("to_gain_mm", "Gain", "mm", 3), |(row, _)| row.to_gain_mm().into()),
             (Column::number("noise_floor_mm", "Noise floor", "mm", 3), |(row, _)| row.noise_floor_mm.into()),
             (Column::text("largest_cause", "Largest cause"), |(row, _)| {
@@ -197,8 +205,8 @@ pub fn table(rows: &[Row]) -> Table {
         ],
     );
     table.notes.push(
-        "Errors are held out (five random folds). Gain: error of the data sheet minus that of the model with causes; arms are ranked by \
-         it. Its size: change of the readings by the cause, RMS over all rows."
+        "Errors are held out (five random folds). Gain: error of the data sheet minus that of the written model, which has none of the causes that are not \
+         certain; arms are ranked by it. Its size: change of the readings by the cause, RMS over all rows."
             .to_owned(),
     );
     table
@@ -249,7 +257,7 @@ pub fn cause_table(rows: &[Row]) -> Table {
 const ROWS: usize = 200;
 
 /// The columns for display, most important first; a common robot is named above the table.
-const DISPLAYED: [&str; 12] = [
+const DISPLAYED: [&str; 13] = [
     "file",
     "rank",
     "status",
@@ -257,6 +265,7 @@ const DISPLAYED: [&str; 12] = [
     "causes",
     "nominal_mm",
     "geometric_mm",
+    "written_mm",
     "extended_mm",
     "noise_floor_mm",
     "rows",
@@ -281,8 +290,8 @@ fn display_table(rows: &[Row]) -> Table {
     table.rows =
         order.iter().map(|(_, row)| shown.iter().map(|&column| row[column].clone()).collect()).collect();
     table.notes.push(
-        "Errors are held out (five random folds). Gain: error of the data sheet minus that of the model with causes; arms are ranked by \
-         it. Causes are listed with their change of the readings, RMS over all rows."
+        "Errors are held out (five random folds). Gain: error of the data sheet minus that of the written model, which has none of the causes that are not \
+         certain; arms are ranked by it. Causes are listed with their change of the readings, RMS over all rows."
             .to_owned(),
     );
     table.excerpt(ROWS)
@@ -320,8 +329,8 @@ fn verdict(rows: &[Row]) -> Verdict {
     if failed.len() > MAX_FAILED {
         reasons.push(format!("and {} more arms that could not be diagnosed", failed.len() - MAX_FAILED));
     }
-    if let Some(cause) = first.and_then(Row::largest) {
-        reasons.push(format!("what to do there: {} ({})", cause.remedy, cause.sentence));
+    if let Some((row, cause)) = first.and_then(|row| Some((row, row.largest()?))) {
+        reasons.push(format!("{}: what to do: {} ({})", row.file, cause.remedy, cause.sentence));
     }
     Verdict::new(status, headline, reasons)
 }
@@ -351,7 +360,7 @@ pub fn document(rows: &[Row]) -> Document {
         KeyFigure::new("Largest gain", largest(Row::to_gain_mm), 3, "mm").note("held-out error, single arm"),
         KeyFigure::new("Data sheet", largest(|row| row.nominal_mm), 3, "mm")
             .note("the largest held-out error"),
-        KeyFigure::new("With causes", largest(|row| row.extended_mm), 3, "mm")
+        KeyFigure::new("Written model", largest(|row| row.written_mm), 3, "mm")
             .note("the largest held-out error"),
         KeyFigure::new("Not diagnosed", rows.iter().filter(|row| row.failed).count(), 0, "")
             .note(format!("of {} arms", rows.len())),
@@ -392,6 +401,7 @@ pub fn json(rows: &[Row]) -> Value {
                 "nominal_mm": row.nominal_mm,
                 "geometric_mm": row.geometric_mm,
                 "extended_mm": row.extended_mm,
+                "written_mm": row.written_mm,
                 "to_gain_mm": row.to_gain_mm(),
                 "noise_floor_mm": row.noise_floor_mm,
                 "causes": causes,

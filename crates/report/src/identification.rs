@@ -290,13 +290,13 @@ pub(super) fn benefit_figures(benefit: Option<&Benefit>) -> Vec<KeyFigure> {
 /// Expected deviation of corrected programs: a range where what the readings still deviate may be noise or the arm's.
 fn programs_after(benefit: &Benefit) -> KeyFigure {
     let probability = percent_of(benefit.probability);
-    let [least, most] =
-        [benefit.estimated_mm, benefit.estimated_at_most_mm].map(|mm| Precision::Decimals(3).format(mm));
     let after = "Programs after";
-    if least == most {
+    // A range where the verdict states one.
+    let Some(most_mm) = benefit.counting_at_most_mm() else {
         return KeyFigure::new(after, benefit.estimated_mm, 3, "mm")
             .note(format!("expected RMS deviation; better with a probability of {probability}"));
-    }
+    };
+    let [least, most] = [benefit.estimated_mm, most_mm].map(|mm| Precision::Decimals(3).format(mm));
     KeyFigure::new(after, format!("{least} to {most}"), 3, "mm").note(format!(
         "expected RMS deviation: the larger, the more of the unexplained rest is the arm's and not noise; better with a probability \
          of {probability}"

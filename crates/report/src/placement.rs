@@ -175,9 +175,7 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
             (Column::text("judged", "Judged"), |(cut, _)| word(cut.assessed).into()),
             (Column::number("off_mm", "before", "mm", 3), |(cut, _)| cut.deviation_mm.into()),
             (Column::number("sigma_mm", "1σ", "mm", 3), |(cut, _)| cut.sigma_mm.into()),
-            (Column::number("worse_percent", "worse", "%", 1), |(cut, _)| {
-                (100.0 * cut.probability_of_harm).into()
-            }),
+            (Column::text("worse_percent", "worse"), |(cut, _)| percent_of(cut.probability_of_harm).into()),
             (Column::text("fate", "Outcome"), |(cut, _)| outcome_word(cut).into()),
         ],
     );

@@ -41,6 +41,17 @@ pub fn cells(errors: &[ErrorSummary]) -> [Cell; 3] {
     FIGURES.map(|(_, _, figure)| over(errors, figure))
 }
 
+/// Ratio of errors from which the largest would flatten the others on a linear axis.
+const WIDE: f64 = 10.0;
+
+fn is_wide(errors: &[Option<Vec<ErrorSummary>>]) -> bool {
+    let means =
+        errors.iter().flatten().filter_map(|all| spread(&all.iter().map(|e| e.rmse).collect::<Vec<_>>()));
+    let sizes = means.map(|(mean, _)| mean).filter(|mean| mean.is_finite() && *mean > 0.0);
+    let (least, most) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), size| (a.min(size), b.max(size)));
+    most > WIDE * least
+}
+
 /// Bar chart of the three statistics for each name; a name without errors has no bar.
 pub fn bars(names: Vec<String>, errors: &[Option<Vec<ErrorSummary>>], labels: Option<Precision>) -> String {
     let groups = FIGURES.map(|(_, heading, figure)| {
@@ -56,7 +67,7 @@ pub fn bars(names: Vec<String>, errors: &[Option<Vec<ErrorSummary>>], labels: Op
     });
     Bars {
         title: "Held-out errors".to_owned(),
-        y: Axis::new("error", "mm"),
+        y: if is_wide(errors) { Axis::log("error", "mm") } else { Axis::new("error", "mm") },
         names,
         groups: groups.into(),
         labels,

@@ -368,7 +368,8 @@ fn list(values: &[f64]) -> String {
     if shown.is_empty() { MISSING.to_owned() } else { shown.join(", ") }
 }
 
-fn dialect(dialect: Dialect) -> &'static str {
+/// The program language of a maker's controllers.
+pub fn dialect(dialect: Dialect) -> &'static str {
     match dialect {
         Dialect::Rapid => "RAPID",
         Dialect::Krl => "KRL",

@@ -132,14 +132,13 @@ fn gain_headline(gain: &ExpectedGain) -> String {
 }
 
 fn gain_sentence(gain: &ExpectedGain) -> String {
-    let [in_use_mm, tracked_mm] = gain.programs_mm;
+    let [_, tracked_mm] = gain.programs_mm;
     let Gain { poses, in_use_mm: in_use, tracked_mm: tracked, .. } = gain.shown;
     format!(
-        "these poses decide what the fit of the model in use left open; the arm need not have changed. Programs that were corrected with it are \
-         off by {in_use_mm:.3} ± {tracked_mm:.3} mm RMS, placement of base and target excluded; with the tracked model they would be off by \
-         {tracked_mm:.3} mm. Errors that neither model contains come on top. Shown by {poses} poses before they were used: the tracked model \
-         predicted them to {tracked:.3} mm, the model in use fits them to {in_use:.3} mm. What to do: correct the original programs with the model \
-         written here"
+        "programs may run as they are; to improve them, correct the originals with the model written here. These poses decide what the fit of the \
+         model in use left open: the arm need not have changed. Placement of base and target is excluded, and so is what neither model contains; the \
+         error of the model in use is known to ± {tracked_mm:.3} mm. Shown by {poses} poses before they were used: the tracked model predicted them to \
+         {tracked:.3} mm, the model in use fits them to {in_use:.3} mm"
     )
 }
 

@@ -333,3 +333,57 @@ fn a_program_with_fewer_motions_was_not_rewritten_from_the_intended_one() {
     assert_eq!(code, 2, "{out}");
     assert!(err.contains("447 motions") && err.contains("--intended has 448"), "{err}");
 }
+
+/// A file in the place of another kind is called what it is, and not what a parser of the expected kind makes of its first line.
+#[test]
+fn a_file_in_the_wrong_place_is_told_what_it_is() {
+    let dir = shop();
+    let at = dir.path();
+    fs::write(at.join("cell.toml"), "[[tool]]\nname = \"t\"\norigin = \"metrology\"\n").unwrap();
+    let ur5 = ["path", "blade.toml", "--robot", "universal-robots-ur5", "-o", "ur.mod"];
+    let (code, _, err) =
+        truegrind(at, &["compensate", "blade.mod", "--model", "model.toml", "-o", "real.mod"]);
+    assert!(code < 2, "{err}");
+    for (arguments, words) in [
+        (
+            &["deviation", "blade.mod", "--intended", "real.mod", "--model", "model.toml"][..],
+            ["itself corrected (with model model.toml)", "the two programs are swapped"],
+        ),
+        (
+            &["path", "blade.mod", "--robot", "abb-irb-120", "-o", "x.mod"],
+            ["this is a RAPID program", "expected a surface file"],
+        ),
+        (&["simulate", "blade.mpf", "-o", "x.csv"], ["this is an NC program", "expected a recipe"]),
+        (
+            &["compensate", "blade.mod", "--model", "cell.toml", "-o", "x.mod"],
+            ["this is a cell file, which --cell reads", "expected a model file"],
+        ),
+        (
+            &["identify", "poses.csv", "--robot", "abb-irb-120", "-o", "x.xlsx"],
+            ["a model file is TOML", "not .xlsx"],
+        ),
+    ] {
+        let (code, out, err) = truegrind(at, arguments);
+        assert_eq!(code, 2, "{arguments:?}: {out}{err}");
+        assert!(words.iter().all(|word| err.contains(word)), "{arguments:?}: {err}");
+    }
+    // RAPID for an arm that does not read it is written, with a note.
+    let (code, _, err) = truegrind(at, &ur5);
+    assert!(code == 0 && err.contains("reads URScript"), "{err}");
+    let (_, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "abb.mod"]);
+    assert!(!err.contains("translated"), "{err}");
+}
+
+/// What Excel leaves beside an open workbook is no arm of a fleet, and a workbook that is not read is named.
+#[test]
+fn other_files_of_a_folder_of_arms_are_passed_over_with_a_word() {
+    let dir = folder();
+    let at = dir.path();
+    fs::create_dir(at.join("fleet")).unwrap();
+    fs::write(at.join("fleet/arm.csv"), POSES).unwrap();
+    fs::write(at.join("fleet/~$arm.xlsx"), "owner").unwrap();
+    fs::write(at.join("fleet/old.xls"), "old").unwrap();
+    let (code, out, err) = truegrind(at, &["diagnose", "fleet", "--robot", "abb-irb-120"]);
+    assert!(code < 2 && out.contains("Diagnosis of 1 arm") && !out.contains("[failed]"), "{out}{err}");
+    assert!(err.contains("arm.xlsx is open in Excel") && err.contains("save it as XLSX"), "{err}");
+}

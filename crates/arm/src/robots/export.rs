@@ -71,7 +71,7 @@ fn far_normals(model: &Model, format: Format) -> Option<String> {
     (is_table && farthest_mm > FAR_MM).then(|| {
         format!(
             "nearly parallel axes: their common normal lies {:.0} m away, so that angles must keep all their digits (rounding one at the \
-             fourth decimal of a degree can move the flange by {:.1} mm); --to urdf has no such numbers",
+             fourth decimal of a degree can move the flange by {:.1} mm); a URDF has no such numbers",
             farthest_mm / 1000.0,
             farthest_mm * 0.5e-4_f64.to_radians()
         )

@@ -113,10 +113,10 @@ pub fn import(text: &str, file: &str, choice: &ImportOptions) -> Result<Imported
     let kind = Kind::of(file).ok_or_else(|| {
         foreign_error(
             file,
-            "the ending",
-            file.to_owned(),
-            "a robot file: .toml, .urdf, .csv (table of link parameters), .yaml or .conf (Universal Robots)",
-            "name the file after what is in it",
+            "the extension",
+            file.rsplit_once('.').map_or_else(|| "none".to_owned(), |(_, extension)| format!(".{extension}")),
+            "that of a robot file: .toml, .urdf, .csv (table of link parameters), .yaml or .conf (Universal Robots)",
+            "give a robot file, or rename one that has another extension",
         )
     })?;
     if kind != Kind::Urdf && (choice.base.is_some() || choice.tip.is_some()) {

@@ -291,7 +291,7 @@ fn what_is_no_urdf_of_an_arm_is_refused_in_words() {
         refused(&text, "arm.urdf", &none, words);
     }
     refused(TURNED, "arm.urdf.xacro", &none, &["xacro macros"]);
-    refused(TURNED, "arm.step", &none, &["the ending", ".urdf"]);
+    refused(TURNED, "arm.step", &none, &["the extension", "found .step", ".urdf"]);
     refused(GRIPPER, "arm.urdf", &only_tip("world", "finger_a"), &["finger_joint", "slides"]);
     refused("a", "arm.csv", &only_tip("world", "tool0"), &["base and tip", "links of a URDF"]);
 }

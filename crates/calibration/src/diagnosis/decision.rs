@@ -233,6 +233,16 @@ impl DecisionQuestion<'_> {
                 out.push_str(&format!(" --outlet {:.0},{:.0},{:.0}", outlet.x, outlet.y, outlet.z));
             }
         }
+        // A target beside the axis of joint 6 sees what one on it does not.
+        let target = self.frames.flange_from_target.translation.vector.map(f64::round);
+        if target.norm() > 0.0 {
+            out.push_str(&format!(
+                " --touched-point {},{},{}",
+                target.x + 0.0,
+                target.y + 0.0,
+                target.z + 0.0
+            ));
+        }
         out.push_str(&format!(" --for {DIAGNOSIS_FILE} --finding {number} -o POSES.mod"));
         out
     }

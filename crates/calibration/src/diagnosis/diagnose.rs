@@ -5,7 +5,9 @@ use super::cause_kind::CauseKind;
 use super::data_quality::single_angles;
 use super::decision;
 use super::extension::{Extended, Subject};
-use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
+use super::finding::{
+    Confidence, DiagnoseError, Diagnosis, Finding, Fits, RangeNoise, SCHEMA, Source, Stage,
+};
 use super::handover::{HandedOver, Handover, too_many_aside};
 use super::merged;
 pub use super::options::Options;
@@ -13,9 +15,11 @@ use super::picture::Picture;
 use super::preparation::{Prepared, prepare};
 use super::residual_tests;
 use super::search::{Confirmed, Search, SearchContext};
+use super::selection::is_same_effect;
 use super::summary::{self, Summary};
 use super::testability::not_testable;
 use super::validation::nominal;
+use super::words;
 use crate::identification::benefit::Benefit;
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::Frames;
@@ -123,6 +127,14 @@ pub fn diagnose(
     };
     let HandedOver { estimated, benefit } = handover.arm(&certain, &mut diagnosis.notes);
     diagnosis.verdict = Some(estimated.verdict.clone());
+    for (k, finding) in diagnosis.findings.iter_mut().enumerate() {
+        let own = (0..finding_of_cause.len()).filter(|&cause| finding_of_cause[cause] == k);
+        let effects = own.filter_map(|cause| match &search.found.causes[cause] {
+            Cause::Arm(effect) => Some(effect),
+            Cause::Measurement(_) => None,
+        });
+        say_whether_corrected(finding, effects, &estimated);
+    }
     let (geometric, set_aside) = (search.geometric, search.set_aside);
     Ok(Diagnosed {
         diagnosis,
@@ -135,6 +147,25 @@ pub fn diagnose(
         finding_of_cause,
         pictures,
     })
+}
+
+/// States whether the written arm has the `effects` of a finding, and what to do where it has not: an effect of size 0 corrects nothing.
+fn say_whether_corrected<'a>(
+    finding: &mut Finding,
+    mut effects: impl Iterator<Item = &'a Effect> + Clone,
+    estimated: &Estimated,
+) {
+    if finding.effect == CauseKind::SmallDisturbances || effects.clone().next().is_none() {
+        return;
+    }
+    let is_written = |effect: &Effect| {
+        estimated.model.effects.iter().any(|other| is_same_effect(effect, other) && !other.is_zero())
+    };
+    let corrected = effects.all(is_written);
+    finding.corrected = Some(corrected);
+    if !corrected {
+        finding.remedy = words::remedy_left_out(finding.effect, finding.confidence == Confidence::Ambiguous);
+    }
 }
 
 /// Refuses readings that no arm with this data sheet makes.
@@ -189,8 +220,8 @@ fn refuse_other_rows(search: &Search<'_>, robot: &str) -> Result<(), DiagnoseErr
 /// Says that there are too few poses.
 fn few_poses_note(dataset: &Dataset, needed: usize) -> String {
     format!(
-        "{} rows at {} distinct poses are too few to separate effects from geometry: at least {needed} poses are needed, some hundred are \
-         usual; these results depend on the priors",
+        "{} rows at {} distinct poses are too few to separate effects from geometry: at least {needed} poses are needed (`truegrind plan` \
+         chooses 60); these results depend on the priors",
         dataset.rows.len(),
         count_distinct_poses(dataset, usize::MAX)
     )

@@ -222,6 +222,9 @@ pub struct Finding {
     /// The measurement that decides.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub decided_by: Option<String>,
+    /// Whether the written arm has it, so that `compensate` corrects it; absent for causes of the measurement.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corrected: Option<bool>,
     /// Rivals, best first.
     pub alternatives: Vec<Alternative>,
     /// Recommended action in the workshop.

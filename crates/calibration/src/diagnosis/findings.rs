@@ -282,6 +282,7 @@ impl FindingBuilder<'_> {
             margin: None,
             members: Vec::new(),
             decided_by: None,
+            corrected: None,
             alternatives,
             remedy: words::remedy_of(cause).to_owned(),
         };

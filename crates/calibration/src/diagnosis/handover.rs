@@ -292,12 +292,12 @@ impl Handover<'_> {
     }
 }
 
-/// The same rows identified, with the options of the diagnosis.
+/// The same rows identified, with the options of the diagnosis and beside the same frames.
 fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification> {
     let SearchContext { dataset, subject, options, .. } = context;
     let defaults = identify::Options::default();
     let alone = identify::Options {
-        tolerance: options.arm_tolerance,
+        tolerance: options.arm_tolerance.with_frames_of(subject.tolerance),
         seed: options.selection.seed,
         fuse_readout: options.fuse_readout,
         limit_rmse_mm: options.limits.rmse_mm,

@@ -267,17 +267,20 @@ const DOUBT_MARGIN: f64 = 30.0;
 /// Whether `causes` contains one with the same parameters (of any value).
 pub(super) fn contains_cause(causes: &[Cause], candidate: &Cause) -> bool {
     causes.iter().any(|c| match (c, candidate) {
-        (Cause::Arm(a), Cause::Arm(b)) => {
-            let still = |e: &Effect| {
-                let mut e = e.clone();
-                (0..e.parameters().len()).for_each(|k| e.set(k, 0.0));
-                e
-            };
-            still(a) == still(b)
-        }
+        (Cause::Arm(a), Cause::Arm(b)) => is_same_effect(a, b),
         (Cause::Measurement(a), Cause::Measurement(b)) => a.kind == b.kind && a.profile == b.profile,
         _ => false,
     })
+}
+
+/// Whether two effects differ in nothing but their size.
+pub(super) fn is_same_effect(a: &Effect, b: &Effect) -> bool {
+    let still = |effect: &Effect| {
+        let mut effect = effect.clone();
+        (0..effect.parameters().len()).for_each(|k| effect.set(k, 0.0));
+        effect
+    };
+    still(a) == still(b)
 }
 
 /// Merit by which a cause must exceed another to replace it.

@@ -101,6 +101,7 @@ pub(super) fn finding(
         margin: None,
         members: Vec::new(),
         decided_by: None,
+        corrected: None,
         alternatives: Vec::new(),
         remedy: remedy(effect).to_owned(),
     }
@@ -447,6 +448,24 @@ pub(super) fn remedy_of(cause: &Cause) -> &'static str {
         }
         kind => remedy(kind),
     }
+}
+
+/// The recommended action for a kind of cause of the arm that the written model does not have; `uncertain`: since it is not certain.
+pub(super) fn remedy_left_out(effect: CauseKind, uncertain: bool) -> String {
+    use CauseKind::*;
+    let why = if uncertain { ", since it is not certain" } else { " (see the notes)" };
+    let left = format!("do not expect programs to be corrected for it: the written model leaves it out{why}");
+    // What of `remedy` holds without a model.
+    let further = match effect {
+        JointCompliance => "check belts and reducer preload",
+        LinkBending => "check the bolts of this link",
+        GearEccentricity => "at the next repair, look at the gear and the encoder ring",
+        GearTransmission => "inspect the reducer for wear",
+        Backlash => "approach every point from the same side",
+        SmoothCorrection => return left,
+        _ => remedy(effect),
+    };
+    format!("{left}; {further}")
 }
 
 /// The recommended action for a kind of cause.

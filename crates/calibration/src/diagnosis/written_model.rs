@@ -55,13 +55,7 @@ pub(super) fn fit_written(
 ) -> Extended {
     let time_discrepancy = time_discrepancy(discrepancy);
     let kept = if causes == extended.causes { extended.clone() } else { refit(subject, causes, extended) };
-    let wide = subject.tolerance;
-    let stated = Tolerance {
-        frame_mm: wide.frame_mm,
-        frame_rad: wide.frame_rad,
-        learn_widths: false,
-        ..*arm_tolerance
-    };
+    let stated = Tolerance { learn_widths: false, ..*arm_tolerance }.with_frames_of(subject.tolerance);
     let tolerance = if arm_tolerance.learn_widths {
         learn_tolerance(&stated, &kept.parameters, &kept.priors, &kept.estimate)
     } else {

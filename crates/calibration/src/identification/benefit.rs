@@ -90,6 +90,12 @@ impl Benefit {
             ..self
         }
     }
+
+    /// `estimated_at_most_mm` where that counts: what may be noise or the arm's is more than all that is expected of the arm.
+    pub fn counting_at_most_mm(&self) -> Option<f64> {
+        let (expected, most) = (self.estimated_mm, self.estimated_at_most_mm);
+        (most.powi(2) > 2.0 * expected.powi(2)).then_some(most)
+    }
 }
 
 /// Why no benefit for programs is stated.

@@ -90,7 +90,7 @@ pub enum IdentifyError {
     /// Fewer scalar readings than parameters.
     #[error(
         "{file}: {rows} rows at {poses} different poses of the arm leave {scalars} independent readings after {held_out} are \
-         held out, for {parameters} parameters: measure at least {needed} poses (some hundred are usual)"
+         held out, for {parameters} parameters: measure at least {needed} poses (`truegrind plan` chooses 60)"
     )]
     TooFewRows {
         /// File.

@@ -52,6 +52,13 @@ impl Default for Tolerance {
 }
 
 impl Tolerance {
+    /// These tolerances of links, beside what `stated` knows of the sensor's frame and of the target.
+    #[must_use]
+    pub fn with_frames_of(self, stated: &Self) -> Self {
+        let Self { target_mm, target_rad, frame_mm, frame_rad, .. } = *stated;
+        Self { target_mm, target_rad, frame_mm, frame_rad, ..self }
+    }
+
     /// The prior of a parameter as a deviation from its starting value: mean 0.
     ///
     /// That of a disturbance depends on its kind: see [`Tolerance::of_disturbance`].

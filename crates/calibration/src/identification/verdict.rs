@@ -6,7 +6,6 @@
 //! request, and every use of it says so.
 
 use crate::identification::benefit::{Benefit, LawError, MIN_PROBABILITY, NoBenefit, ScaleError};
-use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::sensor_laws::SensorLaw;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Sensor;
@@ -272,14 +271,9 @@ fn beyond_noise_clause(found: &Benefit) -> String {
         }
         _ => String::new(),
     };
-    // With all that is left in place of what is known of it.
-    let (BeyondNoise::AtMost(most_mm) | BeyondNoise::Between { most_mm, .. }) = beyond else { return out };
-    let least_mm = beyond.known_mm().unwrap_or(0.0);
-    let further_mm = (most_mm.powi(2) - least_mm.powi(2)).max(0.0).sqrt();
-    if further_mm > found.estimated_mm {
+    if let Some(most_mm) = found.counting_at_most_mm() {
         out += &format!(
-            ", or up to {:.3} mm if the unexplained rest is the arm's and not noise (repeated poses would show it)",
-            further_mm.hypot(found.estimated_mm)
+            ", or up to {most_mm:.3} mm if the unexplained rest is the arm's and not noise (repeated poses would show it)"
         );
     }
     out

@@ -111,13 +111,21 @@ fn note(program: &TemplateProgram<'_>, motion: &Motion, found: &mut BTreeMap<Key
             language: program.language,
             commanded,
             motions: 0,
-            first: (program.name.to_owned(), motion.place.line),
+            first: (file_of(program, motion.place.file), motion.place.line),
         };
         let named = found.entry((is_tool, key)).or_insert_with(new);
         named.motions += 1;
         if named.commanded.is_err() && commanded.is_ok() {
             named.commanded = commanded;
         }
+    }
+}
+
+/// The file of a program, of whose files each counts its own lines.
+fn file_of(program: &TemplateProgram<'_>, file: u32) -> String {
+    match program.listing.files.as_slice() {
+        files @ [_, _, ..] => files.get(file as usize).cloned().unwrap_or_default(),
+        _ => program.name.to_owned(),
     }
 }
 

@@ -10,6 +10,7 @@ use crate::plan::MotionOutcome;
 use crate::risk::beyond_noise::ALIKE_RAD;
 use crate::risk::cut_risk::UnseenShare;
 use crate::target::solved_target::SolvedTargets;
+use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::motion::load::Grip;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Origin, Place, Switch};
@@ -85,6 +86,10 @@ pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item =
     let largest = sigmas_mm.reduce(f64::max)?;
     let knowledge = arms.knowledge?;
     let beyond = knowledge.beyond_noise_mm?;
+    // Beside doubtful effects it is known from these alone, and they are in every σ (`doubtful_effects_note`).
+    if knowledge.beyond_noise_rad.is_none() && knowledge.model.effects.iter().any(Effect::is_zero) {
+        return None;
+    }
     if let Some(rad) = knowledge.beyond_noise_rad {
         return (beyond > COUNTED_SHARE * largest).then(|| {
             let (least, most) = rad.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), rad| (a.min(*rad), b.max(*rad)));
@@ -112,12 +117,17 @@ const WORTH_TELLING_MM: f64 = 0.05;
 /// What of the stated σ comes from parameters that the measurement did not show, where that is most of it.
 pub(crate) fn unseen_note(knowledge: &Estimated, unseen: &UnseenShare) -> Option<String> {
     let name = &knowledge.parameters.get(unseen.parameter?)?.name;
+    // The parts of a σ can cancel in part, so that one of them is larger than the whole.
+    let part = if unseen.unseen_mm < unseen.sigma_mm {
+        format!("of the {:.3} mm (1σ) stated for a cut, {:.3} mm", unseen.sigma_mm, unseen.unseen_mm)
+    } else {
+        format!("the {:.3} mm (1σ) stated for a cut", unseen.sigma_mm)
+    };
     (unseen.unseen_mm > WORTH_TELLING_MM).then(|| {
         format!(
-            "of the {:.3} mm (1σ) stated for a cut, {:.3} mm come from parameters that the measurement did not determine: above all {name} keeps \
-             the tolerance of this arm's links, since the place of the target on the flange is not known independently. Where tool and work object \
-             are taught with this arm (cell file, origin = \"taught\"), such errors cancel",
-            unseen.sigma_mm, unseen.unseen_mm
+            "{part} come from parameters that the measurement did not determine: above all {name} keeps the tolerance of this arm's links, since \
+             the place of the target on the flange is not known independently. Where tool and work object are taught with this arm (cell file, \
+             origin = \"taught\"), such errors cancel"
         )
     })
 }

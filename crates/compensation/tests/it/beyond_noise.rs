@@ -5,6 +5,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
 use truegrind_compensation::cell::Cell;
@@ -161,4 +163,24 @@ fn a_longer_tool_is_known_less_well() {
     let arm = known.model.at_condition(&known.condition);
     let sigma = |mm: f64| known.position_sigma_mm(&arm, &joints[0], &Pose::translation(mm, 0.0, 100.0), None);
     assert!(sigma(600.0) > 1.4 * sigma(0.0), "{} {}", sigma(600.0), sigma(0.0));
+}
+
+/// What uncertain causes make of the measurement stands in the covariance that lists them at size 0: it is not told a second time as lying
+/// beyond every σ.
+#[test]
+fn what_uncertain_causes_explain_is_not_beyond_every_sigma() {
+    let (source, joints) = blade();
+    let mut known = estimated(perturbed(4, 1.0), &joints);
+    known.covariance *= 0.0;
+    known.beyond_noise_mm = Some(0.08);
+    let notes = |known: &Estimated| planned(&source, known, Placement::Shape).notes.join("; ");
+    assert!(notes(&known).contains("beyond every σ"), "{}", notes(&known));
+    known.model.effects.push(Effect::GearEccentricity(Harmonic {
+        joint: 0,
+        order: 1.0,
+        cosine_rad: 0.0,
+        sine_rad: 0.0,
+    }));
+    assert!(notes(&known).contains("counted in every σ but not corrected"), "{}", notes(&known));
+    assert!(!notes(&known).contains("beyond every σ"), "{}", notes(&known));
 }

@@ -6,6 +6,7 @@ mod tables;
 
 use self::figures::{curves, error_bars, rows, time_bars};
 use self::tables::{convergence, cost, errors, parameter_table, verdict, verdict_table};
+use super::named_causes;
 use super::study::{held_out, registered};
 use super::words::reservations;
 use crate::protocol::Study;
@@ -39,7 +40,7 @@ pub(super) fn page(page: &mut Document, study: &Study, timings: bool) {
     page.figure(
         error_bars(study),
         "Held-out errors, mean over the cases; whiskers are one standard deviation over the cases. The papers call the mean \
-         of |e| STD. A method that diverged in any case has no bar.",
+         of |e| STD. A method that diverged in any case has no bar. BC: frames alone; NC: named causes.",
     );
     for (picture, not_drawn) in rows(study) {
         page.figure(
@@ -110,6 +111,14 @@ fn notes(study: &Study) -> Block {
     Block::List(notes)
 }
 
+/// The error of the diagnosis, which is none of the methods compared.
+fn named_causes_beside(study: &Study) -> String {
+    let found = study.named_causes.as_deref().and_then(named_causes::complete);
+    let errors: Vec<f64> = found.into_iter().flatten().map(|case| case.held_out.rmse).collect();
+    let (id, name) = named_causes::LABEL;
+    spread(&errors).map_or_else(String::new, |(mean, _)| format!("; {id} ({name}): {mean:.3} mm"))
+}
+
 fn key_figures(study: &Study) -> Vec<KeyFigure> {
     let rmse = |errors: &[ErrorSummary]| spread(&errors.iter().map(|e| e.rmse).collect::<Vec<_>>());
     let best = study
@@ -120,8 +129,14 @@ fn key_figures(study: &Study) -> Vec<KeyFigure> {
     let mut figures = vec![];
     if let Some((best, (mean, deviation))) = best {
         figures.push(
-            KeyFigure::new("Smallest held-out RMSE", Cell::with_sigma(mean, deviation), 3, "mm")
-                .note(format!("{} {}", best.method.id, best.method.name)),
+            KeyFigure::new("Smallest held-out RMSE", Cell::with_sigma(mean, deviation), 3, "mm").note(
+                format!(
+                    "of geometry alone: {} {}{}",
+                    best.method.id,
+                    best.method.name,
+                    named_causes_beside(study)
+                ),
+            ),
         );
     }
     figures.push(

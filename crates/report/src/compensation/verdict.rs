@@ -270,9 +270,11 @@ fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
             (false, _) => " (shape and placement)",
         };
         let (before, after) = (of.before_mm, of.expected_mm?);
+        // Otherwise the two figures read as if the correction did harm.
+        let besides = if after > before { "; uncorrected it has that uncertainty besides" } else { "" };
         Some(format!(
             "largest deviation of the corrected motions{kind}: {before:.3} mm before; after correction a standard deviation (1σ) of at most \
-             {after:.3} mm is expected"
+             {after:.3} mm is expected{besides}"
         ))
     };
     found.iter().filter_map(of_kind).collect()

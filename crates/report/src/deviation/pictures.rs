@@ -71,9 +71,11 @@ const SAME: &str = " = ";
 
 const SIGNED: &str = "deviation along the normal";
 
+const SIZE: &str = "size of the deviation";
+
 fn quantity(reports: &[&PathReport]) -> &'static str {
     let signed = reports.iter().flat_map(|report| report.cut()).all(|point| point.normal.is_some());
-    if signed { SIGNED } else { "size of the deviation" }
+    if signed { SIGNED } else { SIZE }
 }
 
 fn along(reports: &[&PathReport]) -> Figure {
@@ -193,7 +195,9 @@ fn strips(reports: &[&PathReport]) -> Option<Figure> {
 fn plan(reports: &[&PathReport]) -> Option<Figure> {
     let first = reports.first()?;
     let axes = widest(first)?;
-    let signed = quantity(reports) == SIGNED;
+    // A σ has no sign: on a signed scale beside it an uncorrected path of small deviations would look like the better one.
+    let shows_sigma = shown(reports).iter().any(Shown::is_remainder);
+    let signed = quantity(reports) == SIGNED && !shows_sigma;
     let names = ["x", "y", "z"];
     let cuts = first.points.iter().any(|point| point.cutting);
     let paths: Vec<PlanPath> = shown(reports)
@@ -222,7 +226,7 @@ fn plan(reports: &[&PathReport]) -> Option<Figure> {
         title: "Where on the part".to_owned(),
         x: Axis::new(names[axes[0]], "mm"),
         y: Axis::new(names[axes[1]], "mm"),
-        value: Axis::new(quantity(reports), "mm"),
+        value: Axis::new(if signed { SIGNED } else { SIZE }, "mm"),
         colors: if signed { ColorMap::CoolWarm } else { ColorMap::Viridis },
         paths,
     };

@@ -16,8 +16,16 @@ type Judged<'a> = (&'a PathReport, f64, f64);
 /// A reason, with the status that it gives at least.
 type Reason = (Status, String);
 
+/// Whether the risk of a worse path is stated beside the reports. A σ has no direction, so where it exceeds the deviation it may still
+/// be certain that a correction helps: the probability knows, and says so.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Risk {
+    Stated,
+    Unstated,
+}
+
 /// The verdict on one program under all models.
-pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
+pub(super) fn verdict(reports: &[&PathReport], risk: Risk) -> Verdict {
     let judged: Vec<Judged<'_>> = reports
         .iter()
         .filter_map(|report| Some((*report, largest(report, BEFORE)?, largest(report, AFTER)?)))
@@ -29,7 +37,7 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
         found.extend(steps(report).map(|words| (Status::Warning, words)));
         found.extend(between_targets(report));
         found.extend(turns(report));
-        found.extend(of_certainty(report));
+        found.extend(of_certainty(report, risk));
     }
     found.extend(missing(reports));
     let holds = |status: &Status| found.iter().any(|(of, _)| of == status);
@@ -87,7 +95,7 @@ fn of_path(report: &PathReport, before: f64, after: f64, all_worse: bool) -> Opt
 }
 
 /// Whether the model corrects a cut, and knows the arm well enough for that.
-fn of_certainty(report: &PathReport) -> Option<Reason> {
+fn of_certainty(report: &PathReport, risk: Risk) -> Option<Reason> {
     // A model that corrects no cut has no correction whose certainty could be judged.
     if report.cut().all(|point| point.status == MotionStatus::Left) {
         let because = report.cut().find_map(|point| point.reason.as_ref());
@@ -95,10 +103,10 @@ fn of_certainty(report: &PathReport) -> Option<Reason> {
         return Some((Status::Warning, format!("{} corrects no cut{because}", report.model)));
     }
     let (sigma, rms) = (report.sigma_rms_mm()?, rms(report, BEFORE)?);
-    (sigma > rms && only_shape(report).is_none()).then(|| {
+    (risk == Risk::Unstated && sigma > rms && only_shape(report).is_none()).then(|| {
         let words = format!(
-            "{}: the predicted 1σ, {sigma:.3} mm, exceeds the deviation to correct, {rms:.3} mm RMS: the model cannot say whether the correction \
-             helps here",
+            "{}: the predicted 1σ, {sigma:.3} mm, exceeds the deviation to correct, {rms:.3} mm RMS: `truegrind compensate` states with what \
+             probability the correction makes it worse",
             report.model
         );
         (Status::Warning, words)
@@ -256,15 +264,34 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
                 of_model(report),
             )
         }
+        [(report, ..)] if report.points.iter().all(|point| !point.is_corrected()) => {
+            format!(
+                "Nothing was corrected: both programs state the same targets, and the path deviates by up to {}{}",
+                known(size(report)),
+                of_model(report),
+            )
+        }
         [(report, ..)] if report.expected_mm().is_some() => {
             // Both unsigned, since the expected deviation has no sign.
             let before = size(report);
-            format!(
-                "Largest deviation {} before; after correction a standard deviation (1σ) of at most {} is expected{}",
-                known(before),
-                known(report.expected_mm()),
-                of_model(report),
-            )
+            let largest = |corrected: bool| {
+                let points = report.cut().filter(|point| point.is_corrected() == corrected);
+                points.filter_map(PathPoint::expected_mm).filter(|mm| mm.is_finite()).reduce(f64::max)
+            };
+            // A deviation that stays is no standard deviation.
+            let after = match (largest(true), largest(false)) {
+                (Some(sigma), None) => {
+                    format!("after correction a standard deviation (1σ) of at most {sigma:.3} mm is expected")
+                }
+                (Some(sigma), Some(stays)) => format!(
+                    "after correction a standard deviation (1σ) of at most {sigma:.3} mm is expected, and points that are not corrected deviate by \
+                     up to {stays:.3} mm"
+                ),
+                (None, stays) => {
+                    format!("no point of a cut is corrected: they deviate by up to {}", known(stays))
+                }
+            };
+            format!("Largest deviation {} before; {after}{}", known(before), of_model(report))
         }
         [(report, before, after)] => format!(
             "Largest deviation{} {before:.3} mm before, {after:.*} mm after ({}){}{}",

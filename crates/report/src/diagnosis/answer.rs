@@ -1,6 +1,6 @@
 //! The answer of a diagnosis, on one screen: what was found, where, how sure that is, and what to do.
 
-use super::words::{confidence, family, located, member};
+use super::words::{AMBIGUOUS, confidence, family, located, member, not_certain};
 use crate::document::{Block, Verdict};
 use crate::status::Status;
 use crate::table::{Column, Table};
@@ -43,7 +43,7 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
             "the noise floor is unknown, since too few poses were repeated from the same sides".to_owned()
         }
         Some(floor) => format!(
-            "what is left of the log's rounding accounts for {floor:.3} mm; the noise of the sensor is unknown, since too few poses were \
+            "rounding of the logged angles: {floor:.3} mm; the noise of the sensor is unknown, since too few poses were \
              repeated from the same sides"
         ),
         None => format!("the noise floor is unknown, since {}", diagnosis.noise_floor_source),
@@ -151,6 +151,9 @@ fn findings(diagnosis: &Diagnosis) -> Table {
          than its alternatives, and is found again in halves of the rows."
             .to_owned(),
     );
+    if diagnosis.findings.iter().any(is_possible) {
+        table.notes.push(AMBIGUOUS.to_owned());
+    }
     table
 }
 
@@ -181,9 +184,10 @@ fn actions(diagnosis: &Diagnosis) -> Vec<String> {
     let mut out: Vec<(String, Vec<usize>)> = Vec::new();
     for (number, finding) in asked {
         // A command names the number of its finding.
-        let action = match &finding.decided_by {
-            Some(decision) => format!("to decide, {decision}"),
-            None => finding.remedy.clone(),
+        let action = match (&finding.decided_by, not_certain(finding)) {
+            (Some(decision), Some(why)) => format!("{why}; to decide, {decision}"),
+            (Some(decision), None) => format!("to decide, {decision}"),
+            (None, _) => finding.remedy.clone(),
         };
         match out.iter_mut().find(|(same, _)| *same == action) {
             Some((_, numbers)) => numbers.push(number),

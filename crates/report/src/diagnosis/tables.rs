@@ -1,6 +1,6 @@
 //! Tables of a diagnosis.
 
-use super::words::{confidence, place, place_of};
+use super::words::{AMBIGUOUS, confidence, place, place_of};
 use crate::table::{Cell, Column, Table};
 use truegrind_arm::parameter::display_unit;
 use truegrind_calibration::diagnosis::finding::{Diagnosis, Finding, FoundParameter};
@@ -81,6 +81,7 @@ pub fn finding_table(diagnosis: &Diagnosis) -> Table {
          alternatives, significant once smooth unmodelled trends are allowed for, and found again in halves of the rows."
             .to_owned(),
     );
+    table.notes.push(AMBIGUOUS.to_owned());
     table
 }
 

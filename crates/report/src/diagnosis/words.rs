@@ -115,6 +115,34 @@ pub(super) fn doubts(finding: &Finding) -> Vec<String> {
     }
 }
 
+/// Explains the word in tables.
+pub(super) const AMBIGUOUS: &str = "ambiguous: there is such an error, but not certainly of this cause, for the reason given with the finding; \
+                                    programs are corrected for it only where that is said.";
+
+/// Why a finding is not certain, its nearest rival, and whether programs are corrected for it all the same; `None` where nothing is known
+/// against it.
+pub(super) fn not_certain(finding: &Finding) -> Option<String> {
+    let (doubt, rival) = match finding.confidence {
+        Confidence::Identified => return None,
+        Confidence::Ambiguous => (finding.doubts.first(), finding.alternatives.first()),
+    };
+    // Rivals that have a share stand in the table.
+    let rival = rival.filter(|_| finding.members.is_empty()).map(|rival| {
+        format!("nearest rival: {}", located(rival.effect, rival.joints.as_deref(), rival.rows))
+    });
+    let why = match (doubt, rival) {
+        (Some(doubt), Some(rival)) => format!("not certain: {doubt} ({rival})"),
+        (Some(doubt), None) => format!("not certain: {doubt}"),
+        (None, Some(rival)) => format!("not certain ({rival})"),
+        (None, None) => return None,
+    };
+    Some(match finding.corrected {
+        Some(true) => format!("{why}; programs are corrected for it, since only its place is uncertain"),
+        Some(false) => format!("{why}; the written model leaves it out"),
+        None => why,
+    })
+}
+
 pub(super) fn remaining(diagnosis: &Diagnosis) -> String {
     let rmse = diagnosis.fits.extended.rmse_mm;
     match (&diagnosis.remaining, diagnosis.noise_floor_mm) {

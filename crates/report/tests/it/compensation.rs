@@ -454,6 +454,14 @@ fn before_and_after_are_stated_of_the_same_motions() {
     plan.placements[1].applied = Placement::Absolute;
     let text = said(&plan);
     assert!(text.contains("corrected motions: 1.200 mm before; after correction a standard deviation (1σ) of at most 0.600 mm is expected"), "{text}");
+    assert!(!text.contains("besides"), "{text}");
+    // A σ above the deviation is no harm by the correction: the uncorrected program has it too.
+    plan.outcomes[1].sigma_mm = 1.5.into();
+    let text = said(&plan);
+    assert!(
+        text.contains("of at most 1.500 mm is expected; uncorrected it has that uncertainty besides"),
+        "{text}"
+    );
 }
 
 /// A program that was corrected before states numbers that were never intended: nothing refers to them.

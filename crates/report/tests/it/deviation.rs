@@ -5,10 +5,13 @@ use truegrind_arm::region::Outside;
 use truegrind_compensation::deviation::{
     After, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
 };
+use truegrind_compensation::plan::Plan;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
+use truegrind_programs::rapid::Task;
+use truegrind_report::compensation;
 use truegrind_report::deviation as view;
-use truegrind_report::format::{csv, markdown, terminal};
+use truegrind_report::format::{csv, html, markdown, terminal};
 use truegrind_report::status::Status as ViewStatus;
 use truegrind_report::table::Cell;
 
@@ -446,6 +449,15 @@ fn a_correction_smaller_than_its_sigma_is_called_so() {
     let text = page(&unsure);
     assert!(text.contains("[warning] Largest deviation"), "{text}");
     assert!(text.contains("predicted 1σ, 4.000 mm, exceeds the deviation to correct"), "{text}");
+    // Beside the probability that a correction does harm, which knows the direction of the uncertainty, the σ alone says nothing else.
+    let listing = Task::read(&[("blade.mod", b"")]).listing;
+    let of_plan = |probability_of_harm: Option<f64>| {
+        let plan = Plan { probability_of_harm, ..Plan::default() };
+        let reports = std::slice::from_ref(&unsure);
+        terminal::document(&compensation::document(&plan, &listing, &[], reports), 200)
+    };
+    assert!(of_plan(None).contains("exceeds the deviation to correct"));
+    assert!(!of_plan(Some(4e-4)).contains("exceeds the deviation"), "{}", of_plan(Some(4e-4)));
 }
 
 #[test]
@@ -562,4 +574,39 @@ fn a_program_that_differs_by_more_than_a_correction_fails_with_its_lines() {
     let mut plain = raster("arm", After::PredictedRemainder, 0.0);
     plain.points.iter_mut().for_each(|point| (point.after, point.status) = (None, Status::Left));
     assert_eq!(status(&plain), ViewStatus::Good);
+}
+
+/// The expected deviation has no sign. On one scale with a signed one, small corrected deviations would have the colour of the largest.
+#[test]
+fn the_map_of_an_expected_deviation_shows_sizes() {
+    let map = |after: After| {
+        let page = html::document(&view::document(&[raster("m", after, 1e-4)]));
+        page.split_once("Where on the part").unwrap().1.split_once("</figure>").unwrap().0.to_owned()
+    };
+    let (expected, achieved) = (map(After::PredictedRemainder), map(After::Achieved));
+    assert!(expected.contains("size of the deviation") && !expected.contains("along the normal"));
+    assert!(achieved.contains("deviation along the normal"));
+}
+
+/// A program that was compared with itself has no σ of a correction, and a deviation that stays is none either.
+#[test]
+fn what_stays_is_not_called_a_standard_deviation() {
+    let headline = |report: &PathReport| {
+        let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(report)), 300);
+        page.lines().find(|line| line.starts_with('[')).unwrap().to_owned()
+    };
+    let mut report = raster("m", After::PredictedRemainder, 1e-4);
+    report.points.iter_mut().for_each(|point| (point.status, point.sigma_mm) = (Status::Changed, Some(0.05)));
+    assert!(headline(&report).contains("a standard deviation (1σ) of at most 0.050 mm is expected;"));
+    let stays = report.points[20].before.unwrap().norm_mm();
+    (report.points[20].status, report.points[20].after) = (Status::Left, report.points[20].before);
+    let words = format!(
+        "of at most 0.050 mm is expected, and points that are not corrected deviate by up to {stays:.3} mm"
+    );
+    assert!(headline(&report).contains(&words), "{}", headline(&report));
+    for point in &mut report.points {
+        (point.status, point.after) = (Status::Left, point.before);
+    }
+    assert!(headline(&report).contains("Nothing was corrected: both programs state the same targets"));
+    assert!(!headline(&report).contains('σ'), "{}", headline(&report));
 }

@@ -84,6 +84,36 @@ fn an_ambiguous_finding_is_titled_by_its_likeliest_member() {
     assert!(page.contains("1. Gear transmission, joint 1"), "{page}");
 }
 
+/// The terminal says why a cause is not certain, its nearest rival, and that programs are not corrected for it.
+#[test]
+fn a_doubt_is_told_with_the_nearest_rival_and_what_becomes_of_programs() {
+    let (found, _) = diagnosed();
+    let mut found = found.clone();
+    let finding = &mut found.diagnosis.findings[0];
+    finding.confidence = Confidence::Ambiguous;
+    finding.doubts = vec!["it is found in 1 of 6 halves of the rows".to_owned()];
+    finding.decided_by = Some("measure it again".to_owned());
+    finding.alternatives = serde_json::from_value(serde_json::json!([
+        {"effect": "base-tilt", "joints": null, "rows": null, "family": "set-up", "cv_rmse_mm": 0.05, "beaten_by": 14.8},
+    ]))
+    .unwrap();
+    for (corrected, words) in [
+        (Some(false), "the written model leaves it out; to decide, measure it again"),
+        (
+            Some(true),
+            "programs are corrected for it, since only its place is uncertain; to decide, measure it again",
+        ),
+    ] {
+        found.diagnosis.findings[0].corrected = corrected;
+        let text = on_a_terminal(&view::summary(&found)).split_whitespace().collect::<Vec<_>>().join(" ");
+        let whole = format!(
+            "1: not certain: it is found in 1 of 6 halves of the rows (nearest rival: base tilt); {words}"
+        );
+        assert!(text.contains(&whole), "{text}");
+        assert!(text.contains("ambiguous: there is such an error"), "{text}");
+    }
+}
+
 /// What is cut short is a list of parts, and not a sentence that happens to have a semicolon.
 #[test]
 fn a_finding_of_several_terms_is_titled_by_the_first() {
@@ -189,9 +219,7 @@ fn the_headline_says_what_the_noise_floor_is_of() {
     assert!(!fine.contains("0.000 mm"), "{fine}");
     let coarse = headline(0.012, rounding);
     assert!(
-        coarse.contains(
-            "what is left of the log's rounding accounts for 0.012 mm; the noise of the sensor is unknown"
-        ),
+        coarse.contains("rounding of the logged angles: 0.012 mm; the noise of the sensor is unknown"),
         "{coarse}"
     );
     let measured = headline(0.012, NoiseFloorSource::Repeats { poses: 20, freedom: 40 });

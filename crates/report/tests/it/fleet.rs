@@ -23,6 +23,7 @@ fn row(file: &str, nominal_mm: f64, extended_mm: f64, causes: Vec<Cause>) -> Row
         nominal_mm: Some(nominal_mm),
         geometric_mm: Some(extended_mm),
         extended_mm: Some(extended_mm),
+        written_mm: Some(extended_mm),
         noise_floor_mm: None,
         causes,
         output: Some(format!("{file}.toml")),
@@ -62,4 +63,18 @@ fn the_arm_with_most_to_gain_comes_first() {
     assert!(causes.contains("backlash,1,1,0.3,"), "{causes}");
     assert_eq!(json(&rows)["arms"][2]["rank"], 1);
     assert!(terminal::document(&summary(&rows), 120).contains("no column q1"));
+}
+
+/// What the links of the table lead to is the written model: causes that are not certain are not in it, and gain nothing.
+#[test]
+fn the_gain_is_that_of_the_written_model() {
+    let mut doubted = row("doubted.csv", 1.0, 0.1, vec![cause(CauseKind::JointCompliance, 0.5, false)]);
+    doubted.written_mm = Some(0.8);
+    let rows = [doubted, row("sure.csv", 0.9, 0.2, vec![cause(CauseKind::Backlash, 0.4, true)])];
+    assert_eq!(ranks(&rows), [Some(2), Some(1)]);
+    let text = terminal::document(&summary(&rows), 200);
+    assert!(text.contains("Largest gain: sure.csv with 0.700 mm"), "{text}");
+    // Behind the sentence on a failed file "there" would be that file.
+    assert!(text.contains("sure.csv: what to do: tighten it"), "{text}");
+    assert_eq!(json(&rows)["arms"][0]["written_mm"], 0.8);
 }

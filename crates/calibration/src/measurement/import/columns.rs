@@ -6,6 +6,7 @@ use super::cell::{Line, Table};
 use super::column_names::{PATH, POSITION, QUATERNION, READOUT};
 use super::error::{ImportError, Location};
 use crate::measurement::dataset::Sensor;
+use truegrind_math::sentence::listed;
 
 /// Column indices.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,11 +68,9 @@ impl HeaderColumns {
         let is_used = |name: &str| is_known(name) || path.is_some() && PATH.contains(&name);
         let unused: Vec<&str> = by_name.keys().copied().filter(|n| !is_used(n)).collect();
 
-        let missing: Vec<String> = (1..=6)
-            .map(|j| format!("{letter}{j}"))
-            .filter(|name| get(name).is_none())
-            .map(|name| describe_missing(&name, &unused))
-            .collect();
+        let joints = (1..=6).map(|j| format!("{letter}{j}"));
+        let missing: Vec<String> = joints.filter(|name| get(name).is_none()).collect();
+        let missing = describe_missing(&missing, &unused);
         if !missing.is_empty() {
             return Err(ImportError::MissingColumns { location, missing, found });
         }
@@ -234,8 +233,8 @@ fn sensor_columns(
             let turned = QUATERNION.iter().any(|n| get(n).is_some());
             let wanted: Vec<&str> =
                 POSITION.iter().chain(QUATERNION.iter().filter(|_| turned)).copied().collect();
-            let missing: Vec<String> =
-                wanted.iter().filter(|n| get(n).is_none()).map(|n| describe_missing(n, unused)).collect();
+            let missing: Vec<&str> = wanted.iter().copied().filter(|n| get(n).is_none()).collect();
+            let missing = describe_missing(&missing, unused);
             if !missing.is_empty() {
                 let found = found.to_vec();
                 return Err(ImportError::MissingColumns { location: location.clone(), missing, found });
@@ -293,11 +292,23 @@ fn joint_number(name: &str, letter: char) -> Option<usize> {
         .filter(|n| *n > 0)
 }
 
-fn describe_missing(name: &str, unused: &[&str]) -> String {
-    match unused.iter().find(|u| is_near(u, name)) {
-        Some(found) => format!("column {name} is missing: found `{found}`, expected {name}; rename it"),
-        None => format!("column {name} is missing"),
+/// Sentences on missing columns: each with a header that is probably meant for it, and all others in one.
+fn describe_missing<S: AsRef<str>>(names: &[S], unused: &[&str]) -> Vec<String> {
+    let (mut out, mut others) = (Vec::new(), Vec::new());
+    for name in names.iter().map(S::as_ref) {
+        match unused.iter().find(|found| is_near(found, name)) {
+            Some(found) => {
+                out.push(format!("column {name} is missing: found `{found}`, expected {name}; rename it"));
+            }
+            None => others.push(name),
+        }
     }
+    match others.as_slice() {
+        [] => {}
+        [name] => out.push(format!("column {name} is missing")),
+        names => out.push(format!("columns {} are missing", listed(names))),
+    }
+    out
 }
 
 /// Whether a header is likely a misspelling: equal but for case and punctuation, or one letter off.

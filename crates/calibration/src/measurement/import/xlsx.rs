@@ -36,7 +36,7 @@ pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
         return Err(fail("this is an XLS workbook, or an XLSX workbook with a password".to_owned()));
     }
     let unpacked = archive::measure_unpacked(bytes).map_err(|refusal| match refusal {
-        Refusal::Broken(message) => fail(message),
+        Refusal::Broken(message) => fail(format!("the workbook is damaged ({message})")),
         Refusal::Large { found, expected } => ImportError::TooLarge {
             location: Location::file(file),
             found: found.into(),

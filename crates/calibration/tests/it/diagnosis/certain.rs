@@ -21,9 +21,13 @@ use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
 use truegrind_calibration::diagnosis::halves::{HALVES, halves, is_path};
 use truegrind_calibration::diagnosis::marginal::variances;
 use truegrind_calibration::diagnosis::preparation::prepare;
+use truegrind_calibration::identification::calibration::Frames;
 use truegrind_calibration::identification::fit::errors_on;
+use truegrind_calibration::identification::identify;
+use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
+use truegrind_calibration::measurement::split;
 
 use super::scenarios::frames;
 use super::simulator::{Hidden, Log, Setup, run};
@@ -558,4 +562,43 @@ fn what_the_written_arm_lacks_of_the_arm_is_in_its_error_beside_a_droop() {
         assert!(stated_mm > 0.6 * worth_mm, "seed {seed}: {stated_mm:.3} mm beside {worth_mm:.3} mm");
     }
     assert!(left_out > 0, "the droop must be left out of a fit");
+}
+
+/// What is stated of the sensor's frame and of the target shows where the arm stands: a written arm without causes, which is the one that
+/// `identify` fits, knows it as well as that.
+#[test]
+fn a_stated_frame_and_target_count_in_a_written_arm_without_causes() {
+    let (arm, mut rng) = (arm(), ChaCha8Rng::seed_from_u64(47));
+    let rows: Vec<Row> = (0..200)
+        .map(|number| {
+            let q = Joints::from_fn(|_, _| rng.random_range(-1.0..1.0));
+            let at = arm.forward(&q, &Condition::default()).translation.vector;
+            Row::new(number, q, Reading::Position(at + Vector3::from_fn(|_, _| 0.02 * normal(&mut rng))))
+        })
+        .collect();
+    let dataset = Dataset::new("stated.csv", Sensor::Position, rows);
+    let known = Frames::at_origin(0);
+    let written = |options: &Options, starts: &Frames| {
+        let found = diagnose(&dataset, "arm", &arm, starts, options, &|_| {}).unwrap();
+        assert!(found.diagnosis.findings.is_empty(), "{:?}", found.diagnosis.findings);
+        let link = |name: &str| found.estimated.parameters.iter().find(|p| p.name == name).unwrap().sigma;
+        [link("link1.d"), link("link1.theta"), link("link6.d")]
+    };
+    let unstated = written(&Options::default(), &frames(&dataset, &arm));
+    let mut options = Options::default();
+    options.tolerance = Tolerance { frame_mm: 0.01, frame_rad: 1e-5, target_mm: 0.01, ..options.tolerance };
+    let stated = written(&options, &known);
+    let share = [0, 1, 2].map(|k| stated[k] / unstated[k]);
+    assert!(share.iter().all(|share| *share < 0.3), "{stated:?} for {unstated:?}");
+    // Link by link what `identify` states from the same rows beside the same frames.
+    let alone = identify::Options {
+        tolerance: options.arm_tolerance.with_frames_of(&options.tolerance),
+        ..identify::Options::default()
+    };
+    let split = |rows: &Dataset| split::random(rows, alone.held_out, alone.seed);
+    let own = identify::identify(&dataset, "arm", &arm, &known, &split, &alone).unwrap().estimated;
+    for (name, sigma) in ["link1.d", "link1.theta", "link6.d"].into_iter().zip(stated) {
+        let of_identify = own.parameters.iter().find(|p| p.name == name).unwrap().sigma;
+        assert!((sigma / of_identify - 1.0).abs() < 1e-6, "{name}: {sigma}, identify {of_identify}");
+    }
 }

@@ -67,7 +67,7 @@ fn shares_are_bayes_factors_that_sum_to_one() {
 #[test]
 fn uncertain_findings_name_what_decides() {
     let arm = robots::load("abb-irb-120").unwrap().model;
-    let (mut with_members, mut decided) = (0, 0);
+    let (mut with_members, mut decided, mut left_out) = (0, 0, 0);
     let weak = [
         vec![Hidden::Frame { from: 50, to: 58, mm: [0.25, 0.1, 0.0] }],
         vec![Hidden::Tool { from: 40, to: 47, mm: [0.2, 0.1, 0.1] }],
@@ -91,6 +91,13 @@ fn uncertain_findings_name_what_decides() {
         let start = frames(&dataset, &arm);
         let found = diagnose(&dataset, "abb-irb-120", &arm, &start, &Options::default(), &|_| {}).unwrap();
         for (number, finding) in (1..).zip(&found.diagnosis.findings) {
+            // What the written arm has at size 0 is not corrected with it.
+            let says = finding.remedy.contains("compensate with this model");
+            assert!(!says || finding.corrected == Some(true), "{finding:?}");
+            if finding.corrected == Some(false) {
+                left_out += 1;
+                assert!(finding.remedy.contains("the written model leaves it out"), "{finding:?}");
+            }
             if finding.confidence == Confidence::Identified {
                 assert!(finding.members.is_empty() && finding.decided_by.is_none(), "{finding:?}");
                 continue;
@@ -106,8 +113,10 @@ fn uncertain_findings_name_what_decides() {
                 let command = format!("--for DIAGNOSIS.json --finding {number} ");
                 assert!(!decision.contains("truegrind plan") || decision.contains(&command), "{decision}");
                 assert!(!decision.contains("truegrind plan") || decision.contains("--outlet "), "{decision}");
+                let has_target = decision.contains(" --touched-point ");
+                assert!(!decision.contains("truegrind plan") || has_target, "{decision}");
             }
         }
     }
-    assert!(with_members > 0 && decided > 0, "{with_members} {decided}");
+    assert!(with_members > 0 && decided > 0 && left_out > 0, "{with_members} {decided} {left_out}");
 }

@@ -147,7 +147,7 @@ fn the_first_sheet_with_the_columns_or_the_one_named() {
     let error = read(&bytes, Some("Run C")).unwrap_err();
     assert_eq!(error, "rows.xlsx: there is no sheet Run C; it has Notes, Run A, Run B");
     let error = read(&bytes, Some("Notes")).unwrap_err();
-    assert!(error.starts_with("rows.xlsx, sheet Notes, row 1: column q1 is missing"), "{error}");
+    assert!(error.starts_with("rows.xlsx, sheet Notes, row 1: columns q1, q2"), "{error}");
 }
 
 #[test]

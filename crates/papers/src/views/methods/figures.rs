@@ -2,15 +2,26 @@
 
 use crate::experiment::Treatment;
 use crate::protocol::{MethodResult, Study};
-use crate::views::study::{held_out, seconds};
+use crate::views::named_causes;
+use crate::views::study::{held_out, registered, seconds};
 use truegrind_report::number::Precision;
 use truegrind_report::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series, distinguishable};
 use truegrind_report::repeated;
 
 /// A diverged method has no bar: it would dwarf all others.
 pub(super) fn error_bars(study: &Study) -> String {
-    let errors: Vec<_> = study.results.iter().map(held_out).collect();
-    repeated::bars(names(study), &errors, None)
+    let mut names = names(study);
+    let mut errors: Vec<_> = study.results.iter().map(held_out).collect();
+    // The start, and the diagnosis, as in the table.
+    names.insert(0, "BC".to_owned());
+    errors.insert(0, Some(registered(study)));
+    if let Some(cases) = &study.named_causes {
+        names.push(named_causes::LABEL.0.to_owned());
+        errors.push(
+            named_causes::complete(cases).map(|found| found.iter().map(|case| case.held_out).collect()),
+        );
+    }
+    repeated::bars(names, &errors, None)
 }
 
 pub(super) fn time_bars(study: &Study) -> String {
