@@ -172,8 +172,9 @@ pub(crate) fn unchecked_notes(
     if let Some(lines) = lines_of(listing, &listing.nc.external_calls) {
         out.push(format!(
             "{} that is not followed: NC programs are read each by itself, whether or not the other one is given too, lies in the same folder or \
-             stands in the same archive file (--together does not join NC programs). It is assumed to leave work offset, shifts, tool, units and tool \
-             centre point control unchanged; state behind the call again what it changes ({lines})",
+             stands in the same archive file (--together does not join NC programs). Of work offset, shifts, tool, units and tool centre point \
+             control it is assumed to leave unchanged what the text sets to one value only; what the text switches, and what the call \
+             changes, is to be stated again behind it ({lines})",
             counted(listing.nc.external_calls.len(), "block calls another program", "blocks call another program")
         ));
     }

@@ -108,7 +108,7 @@ fn of_certainty(report: &PathReport) -> Option<Reason> {
 /// The path between the targets of the corrected program.
 fn between_targets(report: &PathReport) -> Vec<Reason> {
     let Some(between) = &report.between else { return Vec::new() };
-    let BetweenTargets { tolerance_mm, beyond_lines, unchecked_lines, .. } = between;
+    let BetweenTargets { tolerance_mm, beyond_lines, unchecked_lines, first_lines, .. } = between;
     let mut out = Vec::new();
     if let Some(mm) = between.largest_mm {
         let off = if mm.is_finite() {
@@ -135,6 +135,13 @@ fn between_targets(report: &PathReport) -> Vec<Reason> {
         let words = format!(
             "{}: {} {starts} at a place that is unknown or not corrected: the path from there is not checked ({lines})",
             report.model, between.unchecked
+        );
+        out.push((Status::Warning, words));
+    }
+    if let Some(lines) = first_lines {
+        let words = format!(
+            "{}: nothing tells where the first line or arc of a program or routine starts: the path to its end is not checked ({lines})",
+            report.model
         );
         out.push((Status::Good, words));
     }
@@ -258,12 +265,11 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
         }
         [(report, ..)] if report.expected_mm().is_some() => {
             // Both unsigned, since the expected deviation has no sign.
-            let before = size(report);
             format!(
-                "Largest deviation {} before; after correction a standard deviation (1σ) of at most {} is expected{}",
-                known(before),
-                known(report.expected_mm()),
-                of_model(report),
+                "Largest deviation {} before; {}{}",
+                known(size(report)),
+                expected(report),
+                of_model(report)
             )
         }
         [(report, before, after)] => format!(
@@ -294,6 +300,25 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
                 meaning(first.after),
             )
         }
+    }
+}
+
+/// What is expected after the correction; a point that is not corrected keeps its deviation, which is no σ.
+fn expected(report: &PathReport) -> String {
+    let largest = |is_corrected: bool| {
+        let of = report.cut().filter(move |point| point.is_corrected() == is_corrected);
+        of.filter_map(PathPoint::expected_mm).filter(|mm| mm.is_finite()).reduce(f64::max)
+    };
+    match [largest(true), largest(false)] {
+        [None, left] => format!("no point of a cut is corrected, so up to {} remain", known(left)),
+        [corrected, None] => {
+            format!("after correction a standard deviation (1σ) of at most {} is expected", known(corrected))
+        }
+        [corrected, left] => format!(
+            "after correction up to {} remain at uncorrected points, and a standard deviation (1σ) of at most {} is expected at the others",
+            known(left),
+            known(corrected)
+        ),
     }
 }
 
