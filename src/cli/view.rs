@@ -243,6 +243,8 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
                 kind: MotionKind::AbsoluteJoint,
                 cutting: false,
                 base_from_object: Pose::identity(),
+                part: 0,
+                part_from_object: Pose::identity(),
                 flange_from_tool: Pose::identity(),
                 intended,
                 normal: None,

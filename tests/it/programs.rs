@@ -262,10 +262,11 @@ fn lines_whose_path_nobody_checked_are_named() {
     let text = text.replacen("    IF di1=1 Stop;\n", "    IF di1=1 MoveL CRobT(),v100,fine,tool0;\n", 2);
     fs::write(at.join("a.mod"), text).unwrap();
     let (code, text, err) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--dry-run"]);
-    // Two lines to where the robot stands are left beside cuts.
+    // Two lines to where the robot stands are left beside cuts; nothing tells where those behind them start.
     assert_eq!(code, 1, "{err}");
     let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.contains("except for some lines or arcs"), "{text}");
+    assert!(words.contains("check the refused and flagged motions"), "{text}");
+    assert!(words.contains("of which 2 are flagged"), "{text}");
     assert!(words.contains("3 lines or arcs start at a place that is unknown or not corrected"), "{text}");
     assert!(words.contains("the path to it is not checked (lines 4, 6, 8)"), "{text}");
 }

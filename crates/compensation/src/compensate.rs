@@ -218,7 +218,9 @@ fn refusals(planned: &Plan, rewritten: &Rewritten, listing: &Listing) -> BTreeMa
 fn reconcile(planned: &mut Plan, rewritten: &Rewritten, refused: &BTreeMap<u32, OutcomeReason>) {
     for (change, outcome) in planned.changes.iter().zip(&rewritten.outcomes) {
         let row = &mut planned.outcomes[change.motion as usize];
-        let is_sound = row.status == Status::Changed || row.reason() == Some(OutcomeReason::UnknownStart);
+        let open = [OutcomeReason::UnknownStart, OutcomeReason::UncheckedPath];
+        let is_sound =
+            row.status == Status::Changed || row.reason().is_some_and(|reason| open.contains(&reason));
         if *outcome == Outcome::Unchanged && is_sound {
             row.status = Status::Left;
             row.reason = Some(Box::new(OutcomeReason::NoChange));

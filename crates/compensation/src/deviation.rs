@@ -3,7 +3,7 @@
 //! Frames: the *intended* pose is where the program's author wants the TCP, in the base. A deviation is reached minus
 //! intended, its vector in the axes of the work object, in which programs and parts are measured.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix3, Point3, SVD, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -96,6 +96,10 @@ pub struct PathPoint {
     pub cutting: bool,
     /// Work object in the base.
     pub base_from_object: Pose,
+    /// The part on which it lies, as an index of the first of the work objects that are placed as one.
+    pub part: u32,
+    /// The work object in a frame that all points of the part have in common: the base, or the flange that holds the part.
+    pub part_from_object: Pose,
     /// Tool on the flange.
     pub flange_from_tool: Pose,
     /// Intended pose of the TCP, in the base.
@@ -220,6 +224,8 @@ pub struct BetweenTargets {
     pub unchecked: usize,
     /// Their lines, the first few.
     pub unchecked_lines: Option<String>,
+    /// Lines of the corrected lines and arcs with which a program or routine begins, the first few: no text tells where their path starts.
+    pub first_lines: Option<String>,
 }
 
 /// A motion of which a report has no point: the program text does not tell where it leads, or the arm does not reach it.
@@ -359,30 +365,38 @@ impl PathReport {
         Some(Block { five_mm, all: ErrorSummary::of(values) })
     }
 
-    /// RMS of the deviation vectors of the cut after the best rigid motion (mm): the shape error of the path, for a base that was not
-    /// measured in the work object. Points that are not corrected count too: the part has them all. `None` for fewer than three points.
+    /// RMS of the deviation vectors of the cut after the best rigid motion of each part (mm): the shape error of the path, for a base that
+    /// was not measured in the work object. Points that are not corrected count too: the part has them all. `None` for fewer than two
+    /// points.
     pub fn registered_rms_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
-        let pairs: Vec<Pair> = self
-            .cut()
-            .filter_map(|p| {
-                let intended = p.base_from_object.inverse() * Point3::from(p.intended.translation.vector);
-                which(p).map(|d| (intended, intended + d.vector_mm))
-            })
-            .collect();
-        let motion = best_motion(&pairs)?;
-        let rest = pairs.iter().map(|(to, from)| (motion * from - to).norm_squared()).sum::<f64>();
-        Some((rest / pairs.len() as f64).sqrt())
+        let mut parts: BTreeMap<u32, Vec<Pair>> = BTreeMap::new();
+        for point in self.cut() {
+            let Some(deviation) = which(point) else { continue };
+            let in_object =
+                point.base_from_object.inverse() * Point3::from(point.intended.translation.vector);
+            // Two work objects on a part have axes of their own, and so has a displaced one.
+            let intended = point.part_from_object * in_object;
+            let reached = point.part_from_object * (in_object + deviation.vector_mm);
+            parts.entry(point.part).or_default().push((intended, reached));
+        }
+        let count = parts.values().map(Vec::len).sum::<usize>();
+        if count < 2 {
+            return None;
+        }
+        let mut rest = 0.0;
+        for pairs in parts.values() {
+            let motion = best_motion(pairs)?;
+            rest += pairs.iter().map(|(to, from)| (motion * from - to).norm_squared()).sum::<f64>();
+        }
+        Some((rest / count as f64).sqrt())
     }
 }
 
 /// Intended and reached point.
 type Pair = (Point3<f64>, Point3<f64>);
 
-/// The rigid motion that best maps the second points onto the first (Kabsch); `None` for fewer than three.
+/// The rigid motion that best maps the second points onto the first (Kabsch).
 fn best_motion(pairs: &[Pair]) -> Option<Pose> {
-    if pairs.len() < 3 {
-        return None;
-    }
     let n = pairs.len() as f64;
     let mean =
         |side: fn(&Pair) -> Point3<f64>| pairs.iter().map(|p| side(p).coords).sum::<Vector3<f64>>() / n;

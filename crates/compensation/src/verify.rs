@@ -24,6 +24,7 @@ use crate::deviation::{
 };
 use crate::frames::frame_table::FrameTable;
 use crate::plan::reason::OutcomeReason;
+use crate::risk::fixtures::{self, part_of_motion};
 use crate::segment::condition_schedule::ConditionSchedule;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
@@ -94,7 +95,9 @@ struct RewrittenRun<'a> {
 pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathReport {
     let mut arms = Arms::simulated(acting_arm.nominal, acting_arm.model, &acting_arm.condition);
     arms.knowledge = acting_arm.knowledge;
-    let Run { ends: before, without_end, .. } = run(task.original, task.loads[0], None, &mut arms, task.cell);
+    let Run { ends: before, without_end, frame_table, .. } =
+        run(task.original, task.loads[0], None, &mut arms, task.cell);
+    let part_of = fixtures::of(task.original, &frame_table.taught(), false);
     // Where no word states the configuration, the arm starts both in the same one.
     let start = before.first().map(|end| end.joints);
     let after =
@@ -131,7 +134,9 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
     let points = before.iter().enumerate().map(|(index, first)| {
         checkpoint();
         let second = after.as_ref().and_then(|after| after.ends[after.partners[first.motion]?]);
-        path_point(index, (first, second), task, acting_arm, &arms)
+        let real = &frame_table.list[first.frames_index].real;
+        let part = part_of_motion(&task.original.motions[first.motion], &part_of);
+        path_point(index, (first, second), (part, real.object), task, acting_arm, &arms)
     });
     PathReport {
         program: task.program.to_owned(),
@@ -154,6 +159,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
 fn path_point(
     index: usize,
     (first, second): (&ExecutedEnd, Option<&ExecutedEnd>),
+    (part, part_from_object): (u32, Pose),
     task: &VerificationTask<'_>,
     acting_arm: &ActingArm<'_>,
     arms: &Arms<'_>,
@@ -176,6 +182,8 @@ fn path_point(
         kind: motion.kind,
         cutting: if task.surface.is_some() { linear && on_surface } else { linear },
         base_from_object: first.base_from_object,
+        part,
+        part_from_object,
         flange_from_tool: first.flange_from_tool,
         intended: first.base_from_object * first.commanded,
         normal,

@@ -439,6 +439,7 @@ fn model_json(report: &PathReport) -> Value {
             "beyond_tolerance_lines": between.beyond_lines,
             "unchecked": between.unchecked,
             "unchecked_lines": between.unchecked_lines,
+            "first_lines": between.first_lines,
         })),
         "summary": { "before": block(BEFORE), "after": block(AFTER) },
         "points": points,

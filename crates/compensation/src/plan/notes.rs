@@ -182,8 +182,9 @@ pub(crate) fn unchecked_notes(
     if let Some(lines) = lines_of(listing, &listing.nc.external_calls) {
         out.push(format!(
             "{} that is not followed: each NC program is read by itself, even if the other one is given too, lies in the same folder or is in the \
-             same archive file (--together does not join NC programs). It is assumed to leave work offset, shifts, tool, units and tool centre \
-             point control unchanged; state again after the call what it changes ({lines})",
+             same archive file (--together does not join NC programs). Of work offset, shifts, tool, units and tool centre point \
+             control it is assumed to leave unchanged only what the text sets to a single value; state again after the call what the text \
+             switches or the call changes ({lines})",
             counted(listing.nc.external_calls.len(), "block calls another program", "blocks call another program")
         ));
     }

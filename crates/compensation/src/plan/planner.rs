@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use crate::arms::Arms;
 use crate::configuration::monitored;
+use crate::cut::StartsOf;
 use crate::deviation::{PathPoint, Status};
 use crate::feasibility::unchanged::blocking_reason;
 use crate::frames::frame_pair::FramePair;
@@ -25,8 +26,10 @@ use crate::plan::notes::{
     unchecked_notes, unknown_loads,
 };
 use crate::plan::reason::OutcomeReason;
+use crate::plan::steps_to_left::is_path;
 use crate::plan::{MotionOutcome, Plan};
 use crate::risk::assessment::Assessment;
+use crate::risk::fixtures::part_of_motion;
 use crate::search_budget;
 use crate::segment::corner::{CUT_MM, cut_of_lines};
 use crate::segment::joint_speed::{Pace, fastest};
@@ -83,6 +86,9 @@ pub(super) fn planned(job: &Planner<'_>) -> Plan {
 pub(super) struct Planner<'a> {
     pub(super) listing: &'a Listing,
     pub(super) solved: &'a SolvedTargets<'a>,
+    pub(super) starts: &'a StartsOf<'a>,
+    /// For each work object the first of those that are placed as one with it.
+    pub(super) part_of: &'a [u32],
     /// Motions that remain unmodified although their targets could be corrected.
     pub(super) unchanged: &'a BTreeMap<u32, OutcomeReason>,
     pub(super) frame_table: &'a FrameTable,
@@ -139,8 +145,15 @@ impl PlannedMotion {
     /// Takes over the worst of the segments from several starts.
     fn take_worst(&mut self, worst: &SegmentPlan) {
         self.outcome.path_deviation_mm = worst.path_deviation_mm.into();
-        if let Some(flag) = worst.flag.filter(|_| self.outcome.status == Status::Changed) {
-            self.flag(flag);
+        if let Some(flag) = worst.flag {
+            self.flag_if_changed(flag);
+        }
+    }
+
+    /// Flags a motion that is written without a flag.
+    fn flag_if_changed(&mut self, why: OutcomeReason) {
+        if self.outcome.status == Status::Changed {
+            self.flag(why);
         }
     }
 
@@ -198,7 +211,12 @@ impl<'a> Planner<'a> {
                         worked.take_worst(&segment_plan);
                         out.from_several.push(index as u32);
                     }
-                    None => out.unchecked.push(index as u32),
+                    None => {
+                        if let Some(why) = with_budget(budget, || self.unchecked_path(index)) {
+                            worked.flag_if_changed(why);
+                        }
+                        out.unchecked.push(index as u32);
+                    }
                 }
             }
             (*outcome, *change) = (worked.outcome, worked.change);
@@ -243,6 +261,11 @@ impl<'a> Planner<'a> {
         let starts = self.listing.predecessors.get(&(index as u32))?.iter();
         let paths: Vec<Segment<'a>> =
             starts.map(|start| self.path_from(*start as usize, index)).collect::<Option<_>>()?;
+        self.worst_of(index, &paths)
+    }
+
+    /// The worst of some segments to the end of a motion, without inserted targets.
+    fn worst_of(&self, index: usize, paths: &[Segment<'a>]) -> Option<SegmentPlan> {
         let motion =
             Motion { insertable: false, can_straighten: false, ..self.listing.motions[index].clone() };
         let via = circle_point(self.solved.of(index));
@@ -253,6 +276,51 @@ impl<'a> Planner<'a> {
         // A segment whose deviation is unknown is the worst.
         let rank = |plan: &SegmentPlan| plan.path_deviation_mm.unwrap_or(f64::INFINITY);
         plans.max_by(|a, b| rank(a).total_cmp(&rank(b)))
+    }
+
+    /// Why a line or arc on which the tool may cut is flagged, of which not every start is known and corrected: what it leaves its way by from
+    /// the starts that are known, or that others may be. A line with which the program begins has no intended way. Beside an uncorrected
+    /// start a step above the tolerance is reported as such.
+    fn unchecked_path(&self, index: usize) -> Option<OutcomeReason> {
+        let motion = &self.listing.motions[index];
+        if !is_path(motion) {
+            return None;
+        }
+        let mut starts = Vec::new();
+        self.starts.each(index as u32, |start| starts.push(start as usize));
+        if starts.is_empty() {
+            return None;
+        }
+        let is_all_known =
+            motion.previous.is_some() || self.listing.predecessors.contains_key(&(index as u32));
+        let to = self.solved.of(index).last()?.as_ref().ok()?;
+        if is_all_known && !(to.shift_mm() <= self.options.tolerance_mm) {
+            let moves = |start: &usize| self.listing.motions[*start].kind != MotionKind::Unknown;
+            return (!starts.iter().all(moves)).then_some(OutcomeReason::UncheckedPath);
+        }
+        let from =
+            |start: &usize| self.path_from(*start, index).or_else(|| self.path_from_left(*start, index));
+        let paths: Vec<Segment<'a>> = starts.iter().filter_map(from).collect();
+        let is_whole = is_all_known && paths.len() == starts.len();
+        let worst = self.worst_of(index, &paths).and_then(|worst| worst.flag);
+        worst.or((!is_whole).then_some(OutcomeReason::UncheckedPath))
+    }
+
+    /// The segment to the end of a motion from one that is not corrected: it begins where the arm is with the original program.
+    fn path_from_left(&self, previous: usize, index: usize) -> Option<Segment<'a>> {
+        let before = &self.listing.motions[previous];
+        let to = segment_end(&self.listing.motions[index], self.solved.of(index), self.frame_table)?;
+        let end = self.solved.of(previous).last()?.as_ref().ok()?;
+        let real = &self.frame_table.list[end.frames_index].real;
+        let stays = SegmentEnd {
+            intended: real.target_of(&self.arms.conditions.arm(end.condition_index).forward(&end.before)),
+            commanded: end.intended.pose(),
+            joints: end.before,
+            ..segment_end(before, self.solved.of(previous), self.frame_table)?
+        };
+        let schedule = self.solved.condition_schedule(index, to.condition_index);
+        let from = if stays.index == to.index { stays } else { stays.with_frames_of(&to) };
+        Some(Segment { from, to, schedule })
     }
 
     /// Deviation from the intended corner at the start of a motion, where the robot rounds it. `last`: segment plan of the
@@ -337,7 +405,8 @@ fn plan_motion<'a>(
             outcome.shape_sigma_mm = to.shape_sigma_mm;
             options.points.then(|| {
                 let real = &job.frame_table.list[to.frames_index].real;
-                Box::new(path_point(motion, to, real, job.assessment.shape_alone(index as u32)))
+                let shape_alone = job.assessment.shape_alone(index as u32);
+                Box::new(path_point(motion, to, real, part_of_motion(motion, job.part_of), shape_alone))
             })
         }
         _ => None,
@@ -448,7 +517,13 @@ fn new_target(
     }
 }
 
-fn path_point(motion: &Motion, solved: &SolvedTarget<'_>, real: &FramePair, shape_alone: bool) -> PathPoint {
+fn path_point(
+    motion: &Motion,
+    solved: &SolvedTarget<'_>,
+    real: &FramePair,
+    part: u32,
+    shape_alone: bool,
+) -> PathPoint {
     let shape_sigma_mm = solved.shape_sigma_mm.get();
     let of_shape = shape_sigma_mm.filter(|_| shape_alone);
     let intended = solved.intended.pose();
@@ -462,6 +537,8 @@ fn path_point(motion: &Motion, solved: &SolvedTarget<'_>, real: &FramePair, shap
         kind: motion.kind,
         cutting: matches!(motion.kind, MotionKind::Linear | MotionKind::Circular),
         base_from_object,
+        part,
+        part_from_object: real.object,
         flange_from_tool: real.flange_from_tool(&flange),
         intended: base_from_object * intended,
         normal: None,

@@ -80,6 +80,8 @@ pub enum OutcomeReason {
     /// The controller does not check the stated configuration but selects the one nearest to the current joints, which the
     /// program does not determine: the motion is corrected for the stated configuration.
     UnknownStart,
+    /// The text does not tell where the line or arc begins, so the path to its end is not checked.
+    UncheckedPath,
     /// The path between two targets deviates from the intended one by more than the tolerance.
     PathDeviation {
         /// Largest deviation (mm).
@@ -292,6 +294,10 @@ impl OutcomeReason {
                 "its configuration is not monitored (ConfL \\Off, ConfJ \\Off): it depends on where the arm comes from, which the program does \
                  not say. Corrected for the stated configuration, or for the one that continues from there: check it, or begin with a joint \
                  target"
+            }
+            OutcomeReason::UncheckedPath => {
+                "the path to it is not checked, since the text does not tell where it begins: check it, or begin it behind a motion that the \
+                 text states"
             }
             OutcomeReason::PartOfCut { because, .. } => because,
             OutcomeReason::Step { .. } => {

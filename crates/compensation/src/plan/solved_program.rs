@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use crate::arms::Arms;
 use crate::cell::Cell;
-use crate::cut::{self, Cuts, CutsOf};
+use crate::cut::{self, Cuts, CutsOf, StartsOf};
 use crate::deviation::Status;
 use crate::feasibility::joint_lines::lines_off_as_joints;
 use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
@@ -54,6 +54,7 @@ pub(crate) struct SolvedProgram<'a> {
     /// The original program, if joints have backlash: only then are targets solved again.
     program: Option<OriginalProgram<'a>>,
     cuts: CutsOf,
+    part_of: Vec<u32>,
     assessment: Assessment,
     solved: SolvedTargets<'a>,
     /// The unmodified motions that `solved` was computed with.
@@ -72,7 +73,7 @@ impl<'a> SolvedProgram<'a> {
         let program = OriginalProgram::of(listing, &arms, &frame_table);
         let part_of = fixtures::of(listing, &frame_table.taught(), options.joint_targets);
         let cuts = cut::of(listing, options.cuts, &part_of);
-        let sample = AssessmentSample::of(listing, &cuts, part_of, |motion| program.knows(motion));
+        let sample = AssessmentSample::of(listing, &cuts, part_of.clone(), |motion| program.knows(motion));
         let assessment =
             assess(listing, sample, &program, &mut arms, &mut frame_table, options, &estimate.posterior);
         let solved_unchanged = assessment.risky();
@@ -86,7 +87,18 @@ impl<'a> SolvedProgram<'a> {
             &solved_unchanged,
         );
         let program = arms.conditions.has_play().then_some(program);
-        Self { listing, options, arms, frame_table, program, cuts, assessment, solved, solved_unchanged }
+        Self {
+            listing,
+            options,
+            arms,
+            frame_table,
+            program,
+            cuts,
+            part_of,
+            assessment,
+            solved,
+            solved_unchanged,
+        }
     }
 
     /// The plan in which the motions that the writer refused (`refused`, by index) remain unmodified, and with them their
@@ -112,11 +124,13 @@ impl<'a> SolvedProgram<'a> {
 
     fn plan_without(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
         let unchanged = self.unchanged_for(refused);
-        let Self { listing, options, arms, frame_table, assessment, solved, .. } = self;
+        let Self { listing, options, arms, frame_table, part_of, assessment, solved, .. } = self;
         let measured_sigma_mm = measured_sigma::of(frame_table, solved, arms);
         let mut plan = planned(&Planner {
             listing,
             solved,
+            starts: &StartsOf::of(listing),
+            part_of,
             measured_sigma_mm: &measured_sigma_mm,
             unchanged: &unchanged,
             frame_table,
@@ -143,8 +157,18 @@ impl<'a> SolvedProgram<'a> {
     /// The motions that remain unmodified. With backlash, an unmodified motion changes the sides from which joints arrive at
     /// later targets: all targets are then solved again.
     fn unchanged_for(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> BTreeMap<u32, OutcomeReason> {
-        let Self { listing, options, arms, frame_table, program, cuts, assessment, solved, solved_unchanged } =
-            self;
+        let Self {
+            listing,
+            options,
+            arms,
+            frame_table,
+            program,
+            cuts,
+            assessment,
+            solved,
+            solved_unchanged,
+            ..
+        } = self;
         let mut refused = refused.clone();
         for (motion, why) in assessment.risky() {
             refused.entry(motion).or_insert(why);

@@ -10,7 +10,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::cut::{find, joins, unite};
-use truegrind_programs::motion::{Frame, Listing, MotionKind, WorkObject};
+use truegrind_programs::motion::{Frame, Listing, Motion, MotionKind, WorkObject};
 
 /// What two work objects on one fixture have in common.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
@@ -34,6 +34,11 @@ pub(crate) fn of(listing: &Listing, taught: &BTreeSet<u32>, joint_targets: bool)
         }
     }
     (0..first.len() as u32).map(|object| find(&mut first, object)).collect()
+}
+
+/// The part of a motion, by the result of [`of`].
+pub(crate) fn part_of_motion(motion: &Motion, part_of: &[u32]) -> u32 {
+    motion.work_object.map_or(u32::MAX, |object| part_of[object as usize])
 }
 
 /// Whether the robot holds a work object: that moves with the flange and can have no displacement in common with one that stands. `None`

@@ -4,7 +4,8 @@
 //! piece is followed by the acting arm and compared with the intended line or arc by the functions that plan a correction
 //! ([`line_deviation`], [`Circle`]). The intended line or arc is carried to where its two ends are really reached: how far these are off is
 //! told of the targets, and a model other than the correcting one, or a placement that is kept, displaces all of the path alike.
-//! A line or arc that starts at a target which is not corrected is not judged, as `compensate` does not check it either.
+//! A line or arc that starts at a target which is not corrected is judged where its own end hardly moves; elsewhere it is listed, as the path
+//! steps there. Where the text does not tell the start, it is listed and judged from the motions that may come before all the same.
 
 use std::collections::BTreeSet;
 
@@ -13,6 +14,7 @@ use nalgebra::Vector3;
 use super::differences::{nearest_share, way};
 use super::executed_end::{ExecutedEnd, Run};
 use crate::arms::Arms;
+use crate::cut::StartsOf;
 use crate::deviation::BetweenTargets;
 use crate::line_list::lines_of;
 use crate::options::Emit;
@@ -64,18 +66,22 @@ struct Found {
     /// Largest deviation by original motion (mm).
     largest_mm: Vec<Option<f64>>,
     unchecked: BTreeSet<u32>,
+    /// Of these, lines and arcs before which the text has no motion.
+    first: Vec<u32>,
 }
 
 impl<'a> Followed<'a> {
     /// The path between all targets.
     pub(super) fn judged(&self, arms: &Arms<'_>, tolerance_mm: f64) -> BetweenTargets {
         let count = self.original.motions.len();
-        let mut found = Found { largest_mm: vec![None; count], unchecked: BTreeSet::new() };
+        let mut found =
+            Found { largest_mm: vec![None; count], unchecked: BTreeSet::new(), first: Vec::new() };
         let mut free_mm = vec![0.0_f64; count];
         let mut pieces = Vec::new();
+        let starts = StartsOf::of(self.original);
         for index in 0..count {
             checkpoint();
-            self.add_pieces(index, &mut pieces, &mut free_mm[index], &mut found);
+            self.add_pieces(index, &starts, tolerance_mm, &mut pieces, &mut free_mm[index], &mut found);
         }
         for (piece, mm) in pieces.iter().zip(deviations(&pieces, self, arms)) {
             let largest = &mut found.largest_mm[piece.index];
@@ -86,8 +92,9 @@ impl<'a> Followed<'a> {
             .filter(|index| found.largest_mm[*index].is_some_and(|mm| !(mm <= bound_mm(*index))))
             .filter_map(|index| Some(self.partners[index]? as u32))
             .collect();
-        let unchecked: Vec<u32> =
-            found.unchecked.iter().filter_map(|index| Some(self.partners[*index as usize]? as u32)).collect();
+        let rewritten = |index: &u32| Some(self.partners[*index as usize]? as u32);
+        let unchecked: Vec<u32> = found.unchecked.iter().filter_map(rewritten).collect();
+        let first: Vec<u32> = found.first.iter().filter_map(rewritten).collect();
         BetweenTargets {
             tolerance_mm,
             largest_mm: found.largest_mm.into_iter().flatten().reduce(f64::max),
@@ -95,25 +102,42 @@ impl<'a> Followed<'a> {
             beyond_lines: lines_of(self.rewritten, &beyond),
             unchecked: unchecked.len(),
             unchecked_lines: lines_of(self.rewritten, &unchecked),
+            first_lines: lines_of(self.rewritten, &first),
         }
     }
 
     /// The pieces of the path to the end of an original motion, from each place where it may start.
-    fn add_pieces(&self, index: usize, pieces: &mut Vec<Piece<'a>>, free_mm: &mut f64, found: &mut Found) {
+    fn add_pieces(
+        &self,
+        index: usize,
+        known: &StartsOf<'_>,
+        tolerance_mm: f64,
+        pieces: &mut Vec<Piece<'a>>,
+        free_mm: &mut f64,
+        found: &mut Found,
+    ) {
         let was = &self.original.motions[index];
         let Some((end, partner)) = self.changed(index) else { return };
         if !matches!(was.kind, MotionKind::Linear | MotionKind::Circular) {
             return;
         }
-        let several = self.original.predecessors.get(&(index as u32));
-        let starts: Vec<usize> = match (was.previous, several) {
-            (Some(previous), _) => vec![previous as usize],
-            (None, Some(several)) => several.iter().map(|start| *start as usize).collect(),
-            (None, None) => Vec::new(),
-        };
-        let mut is_checked = !starts.is_empty();
+        let is_all_known = was.previous.is_some() || self.original.predecessors.contains_key(&(index as u32));
+        let mut starts = Vec::new();
+        match was.previous {
+            Some(previous) => starts.push(previous as usize),
+            None => known.each(index as u32, |start| starts.push(start as usize)),
+        }
+        if starts.is_empty() {
+            found.first.push(index as u32);
+            return;
+        }
+        let is_still = self.after[partner].is_some_and(|is| {
+            (is.commanded.translation.vector - end.commanded.translation.vector).norm() <= tolerance_mm
+        });
+        let mut is_checked = is_all_known;
         for start in starts {
-            let nodes = self.changed(start).and_then(|(from, first)| {
+            let from = if is_still { self.end(start) } else { self.changed(start) };
+            let nodes = from.and_then(|(from, first)| {
                 let nodes = self.nodes(first, partner, was.previous.is_some())?;
                 self.intended_way(was, from, end, &nodes)
             });
@@ -127,9 +151,14 @@ impl<'a> Followed<'a> {
         }
     }
 
+    /// The end of an original motion and its rewritten motion.
+    fn end(&self, index: usize) -> Option<(&'a ExecutedEnd, usize)> {
+        Some((self.before[index]?, self.partners[index]?))
+    }
+
     /// The end of an original motion and its rewritten motion, where the correction moves it.
     fn changed(&self, index: usize) -> Option<(&'a ExecutedEnd, usize)> {
-        let (end, partner) = (self.before[index]?, self.partners[index]?);
+        let (end, partner) = self.end(index)?;
         let is_moved = !(self.is_same)(end, self.after[partner]?);
         is_moved.then_some((end, partner))
     }

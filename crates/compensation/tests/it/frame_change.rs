@@ -5,9 +5,14 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Joints;
+use truegrind_compensation::cell::Cell;
+use truegrind_compensation::deviation::Status;
 use truegrind_compensation::options::Options;
+use truegrind_compensation::plan::solved_program::plan;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion};
+use truegrind_programs::nc;
+use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::rapid::Task;
 
 use super::segment::{EXT, known, module_with, rewrite};
@@ -97,4 +102,49 @@ fn a_line_that_begins_under_another_tool_is_checked_and_straightened() {
     assert!(outcome.inserted > 0, "{outcome:?}");
     let left = off_line(&source, &text, &known, outcome.inserted as usize);
     assert!(left <= tight.tolerance_mm + 2e-3, "{left} mm, {} asked", tight.tolerance_mm);
+}
+
+/// A shift of the frame moves no axis, but the line behind it counted as one from an unknown start.
+#[test]
+fn a_line_behind_a_shift_of_the_frame_is_checked() {
+    let source = |dialect: usize, y: f64| {
+        let shift = |y: f64| match (dialect, y != 0.0) {
+            (_, false) => String::new(),
+            (0, _) => format!("TRANS X0 Y{y:.1}\n"),
+            (1, _) => format!("TRANS Y{y:.1}\nATRANS X0\nAROT X0\n"),
+            _ => format!("G52 Y{y:.1}\n"),
+        };
+        let head = match dialect {
+            2 => {
+                "O1\n(truegrind angles wpr)\n(truegrind tool T1 t [[0,0,50],[1,0,0,0]])\n(truegrind frame G54 w [[400,0,300],[1,0,0,0]])\n\
+                  G90 G21 G17 G54\nT1 M6\nG43.4 H1\n"
+            }
+            _ => {
+                "; truegrind angles wpr\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[400,0,300],[1,0,0,0]]\n\
+                  G90 G71 G17 G54\nT1 D1 M6\nTRAORI\n"
+            }
+        };
+        format!(
+            "{head}G0 X0.0 Y-250.0 Z20.0 A180.0 B0.0 C0.0\nG1 X0.0 Y-250.0 Z0.0 A180.0 B0.0 C0.0 F600.\n{}\
+             G1 X0.0 Y{:.1} Z0.0 A180.0 B0.0 C0.0\nM30\n",
+            shift(y),
+            250.0 - y
+        )
+    };
+    let known = known(&perturbed(5, 3.0));
+    for dialect in 0..3 {
+        let bend = |y: f64| {
+            let (text, name) = (source(dialect, y), if dialect == 2 { "p.nc" } else { "p.mpf" });
+            let setup = nc::setup::Setup { angles: Some(Angles::Wpr), ..nc::setup::Setup::default() };
+            let listing = nc::Task::read(&[(name, text.as_bytes())], &setup).listing;
+            let loose = Options { tolerance_mm: 5.0, ..Options::default() };
+            let planned = plan(&listing, &known, &Cell::default(), &loose);
+            let outcome = &planned.outcomes[2];
+            assert_eq!(outcome.status, Status::Changed, "{text}{outcome:?}");
+            assert!(!planned.notes.iter().any(|note| note.contains("unknown or not corrected")), "{text}");
+            outcome.path_deviation_mm.get().unwrap()
+        };
+        let (shifted, plain) = (bend(-10.0), bend(0.0));
+        assert!(plain > 0.02 && (shifted - plain).abs() < 1e-6, "{shifted} {plain}");
+    }
 }

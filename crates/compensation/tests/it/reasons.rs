@@ -42,6 +42,7 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::AmbiguousBranch => "open branch",
         // Only where the start is unknown (tests/it/singularity.rs).
         OutcomeReason::UnknownStart => "open start",
+        OutcomeReason::UncheckedPath => "unchecked path",
         OutcomeReason::PathDeviation { .. } => "bend",
         OutcomeReason::CornerDeviation { .. } => "corner",
         // tests/it/segment.rs.
@@ -87,6 +88,7 @@ const NAMES: [&str; 23] = [
     "singular way",
     "other branch",
     "open branch",
+    "unchecked path",
     "bend",
     "corner",
     "circle kept",

@@ -400,3 +400,34 @@ fn a_configuration_that_the_text_does_not_tell_is_said_to_be_taken() {
     let (planned, _) = rewrite(&body("ConfJ\\On"), &known(&actual), &Options::default());
     assert!(!planned.notes.iter().any(|note| note.contains("configuration not monitored")));
 }
+
+/// A line behind a call of a routine that no file declares was called corrected without a check of its path.
+#[test]
+fn a_line_of_which_the_start_is_not_known_is_flagged() {
+    let line = |x: f64, y: f64, turns: &str| {
+        format!("  MoveL [[{x},{y},350],[0,0,1,0],{turns},{EXT}],v100,fine,tool0;\n")
+    };
+    let [a, b] = [line(420.0, -250.0, "[-1,0,-1,0]"), line(420.0, 250.0, "[0,0,0,0]")];
+    let lines = format!("{a}  SetSpindle 5000;\n{b}");
+    let known = known(&perturbed(5, 3.0));
+    let loose = Options { tolerance_mm: 5.0, ..Options::default() };
+    let stated =
+        rewrite(&module_with("", &format!("{a}{b}")), &known, &loose).0.outcomes[1].path_deviation_mm;
+    let stated = stated.get().unwrap();
+    // Where it leads as if the routine did not move.
+    let (tight, _) = rewrite(
+        &module_with("", &lines),
+        &known,
+        &Options { tolerance_mm: stated / 2.0, ..Options::default() },
+    );
+    let why = tight.outcomes[1].reason();
+    assert!(
+        matches!(why, Some(OutcomeReason::PathDeviation { mm }) if (mm - stated).abs() < 1e-9),
+        "{why:?}"
+    );
+    assert_eq!((tight.outcomes[1].status, tight.outcomes[1].inserted), (Status::Flagged, 0));
+    let (planned, _) = rewrite(&module_with("", &lines), &known, &loose);
+    let statuses: Vec<Status> = planned.outcomes.iter().map(|outcome| outcome.status).collect();
+    assert_eq!(statuses, [Status::Changed, Status::Flagged]);
+    assert_eq!(planned.outcomes[1].reason(), Some(OutcomeReason::UncheckedPath));
+}

@@ -91,6 +91,8 @@ fn parts(count: usize) -> Parts {
             kind: MotionKind::Linear,
             cutting,
             base_from_object,
+            part: 0,
+            part_from_object: base_from_object,
             flange_from_tool,
             intended,
             normal: Some(normal),

@@ -121,6 +121,6 @@ reasons! {
         StrayEnd => "closes nothing",
         MissingEnd => "not closed before the end",
         TooDeep => "nested too deeply",
-        Binary => "not text: encoded or binary file",
+        Binary => "not text: encoded or binary file, or UTF-16 (save it as UTF-8 or Latin-1)",
     }
 }

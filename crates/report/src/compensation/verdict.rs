@@ -243,6 +243,13 @@ fn is_again(listing: &Listing) -> bool {
     listing.marks.iter().any(Option::is_some)
 }
 
+/// Whether the deviation of every line and arc on which the tool may cut is unknown: that of the other motions says nothing of the part.
+fn paths_unknown(plan: &Plan, listing: &Listing) -> bool {
+    let mut of_paths =
+        plan.outcomes.iter().filter(|outcome| is_path(&listing.motions[outcome.motion as usize])).peekable();
+    of_paths.peek().is_some() && of_paths.all(|outcome| outcome.before_mm.get().is_none())
+}
+
 /// Deviation before and after, in a sentence for each kind of correction; empty if unknown.
 fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
     if is_again(listing) {
@@ -253,6 +260,9 @@ fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
     }
     let found = if no_cut(plan, listing) { Vec::new() } else { placement::before_and_after(plan, listing) };
     if found.is_empty() {
+        if paths_unknown(plan, listing) {
+            return vec!["by how much the uncorrected program deviates where it cuts is unknown".to_owned()];
+        }
         let unknown = plan.outcomes.iter().filter(|outcome| outcome.before_mm.get().is_none()).count();
         let where_known = match unknown {
             0 => String::new(),
@@ -286,7 +296,10 @@ fn deviation_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
     let after = |mm: Option<f64>, note: String| KeyFigure::new("Expected after", mm, 3, "mm").note(note);
     let nothing = |why: &str| {
         vec![
-            before(placement::largest_mm(plan), "uncorrected, all motions".to_owned()),
+            before(
+                placement::largest_mm(plan).filter(|_| !paths_unknown(plan, listing)),
+                "uncorrected, all motions".to_owned(),
+            ),
             after(None, why.to_owned()),
         ]
     };

@@ -31,7 +31,7 @@ const KINDS: [(MotionKind, &str); 6] = [
 pub fn kept(report: &PathReport) -> Value {
     let PathReport { program, files, model, after, points, missing, differences, between, held_out_mm } =
         report;
-    let mut last = [String::new(), String::new()];
+    let mut last = [const { String::new() }; 3];
     let points: Vec<Value> = points.iter().map(|point| of_point(point, &mut last)).collect();
     json!({
         "program": program,
@@ -48,7 +48,7 @@ pub fn kept(report: &PathReport) -> Value {
 
 /// The report of a record; `None` if the value is not one.
 pub fn from_kept(value: &Value) -> Option<PathReport> {
-    let mut last = [None, None];
+    let mut last = [None; 3];
     let points = value["points"].as_array()?.iter();
     Some(PathReport {
         program: value["program"].as_str()?.to_owned(),
@@ -70,13 +70,21 @@ pub fn from_kept(value: &Value) -> Option<PathReport> {
 }
 
 fn of_between(between: &BetweenTargets) -> Value {
-    let BetweenTargets { tolerance_mm, largest_mm, beyond, beyond_lines, unchecked, unchecked_lines } =
-        between;
-    json!([exact(*tolerance_mm), largest_mm.map(exact), beyond, beyond_lines, unchecked, unchecked_lines])
+    let BetweenTargets {
+        tolerance_mm,
+        largest_mm,
+        beyond,
+        beyond_lines,
+        unchecked,
+        unchecked_lines,
+        first_lines,
+    } = between;
+    let largest_mm = largest_mm.map(exact);
+    json!([exact(*tolerance_mm), largest_mm, beyond, beyond_lines, unchecked, unchecked_lines, first_lines])
 }
 
 fn to_between(value: &Value) -> Option<BetweenTargets> {
-    let [tolerance_mm, largest_mm, beyond, beyond_lines, unchecked, unchecked_lines] =
+    let [tolerance_mm, largest_mm, beyond, beyond_lines, unchecked, unchecked_lines, first_lines] =
         value.as_array()?.as_slice()
     else {
         return None;
@@ -91,10 +99,11 @@ fn to_between(value: &Value) -> Option<BetweenTargets> {
         beyond_lines: lines(beyond_lines),
         unchecked: count(unchecked)?,
         unchecked_lines: lines(unchecked_lines),
+        first_lines: lines(first_lines),
     })
 }
 
-fn of_point(point: &PathPoint, last: &mut [String; 2]) -> Value {
+fn of_point(point: &PathPoint, last: &mut [String; 3]) -> Value {
     // Destructured by field, so that a new field cannot be forgotten.
     let PathPoint {
         index,
@@ -104,6 +113,8 @@ fn of_point(point: &PathPoint, last: &mut [String; 2]) -> Value {
         kind,
         cutting,
         base_from_object,
+        part,
+        part_from_object,
         flange_from_tool,
         intended,
         normal,
@@ -118,7 +129,7 @@ fn of_point(point: &PathPoint, last: &mut [String; 2]) -> Value {
         reason,
     } = point;
     let mut words = Vec::new();
-    for (pose, last) in [base_from_object, flange_from_tool].into_iter().zip(last) {
+    for (pose, last) in [base_from_object, part_from_object, flange_from_tool].into_iter().zip(last) {
         let text = numbers(of_pose(pose));
         words.push(if *last == text { SAME.to_owned() } else { text.clone() });
         *last = text;
@@ -141,11 +152,12 @@ fn of_point(point: &PathPoint, last: &mut [String; 2]) -> Value {
         Some(Outside::Coverage { ratio }) => format!("coverage {}", exact(*ratio)),
     });
     let kind = KINDS.iter().find(|(known, _)| known == kind).map(|(_, word)| *word);
-    json!([index, file, line, instruction, kind, cutting, status, reason, words.join(" ")])
+    json!([index, file, line, instruction, kind, cutting, part, status, reason, words.join(" ")])
 }
 
-fn to_point(value: &Value, last: &mut [Option<Pose>; 2]) -> Option<PathPoint> {
-    let [index, file, line, instruction, kind, cutting, status, reason, words] = value.as_array()?.as_slice()
+fn to_point(value: &Value, last: &mut [Option<Pose>; 3]) -> Option<PathPoint> {
+    let [index, file, line, instruction, kind, cutting, part, status, reason, words] =
+        value.as_array()?.as_slice()
     else {
         return None;
     };
@@ -154,7 +166,7 @@ fn to_point(value: &Value, last: &mut [Option<Pose>; 2]) -> Option<PathPoint> {
     for last in last.iter_mut() {
         *last = Some(pose(words.next()?, words, last.as_ref())?);
     }
-    let [base_from_object, flange_from_tool] = [last[0]?, last[1]?];
+    let [base_from_object, part_from_object, flange_from_tool] = [last[0]?, last[1]?, last[2]?];
     let intended = pose(words.next()?, words, None)?;
     let normal = read::<3>(words)?.map(Vector3::from);
     let [joints_before, joints_after] =
@@ -188,6 +200,8 @@ fn to_point(value: &Value, last: &mut [Option<Pose>; 2]) -> Option<PathPoint> {
         kind: KINDS.iter().find(|(_, word)| *word == kind)?.0,
         cutting: cutting.as_bool()?,
         base_from_object,
+        part: u32::try_from(part.as_u64()?).ok()?,
+        part_from_object,
         flange_from_tool,
         intended,
         normal,

@@ -116,7 +116,7 @@ fn of_certainty(report: &PathReport, risk: Risk) -> Option<Reason> {
 /// The path between the targets of the corrected program.
 fn between_targets(report: &PathReport) -> Vec<Reason> {
     let Some(between) = &report.between else { return Vec::new() };
-    let BetweenTargets { tolerance_mm, beyond_lines, unchecked_lines, .. } = between;
+    let BetweenTargets { tolerance_mm, beyond_lines, unchecked_lines, first_lines, .. } = between;
     let mut out = Vec::new();
     if let Some(mm) = between.largest_mm {
         let off = if mm.is_finite() {
@@ -143,6 +143,13 @@ fn between_targets(report: &PathReport) -> Vec<Reason> {
         let words = format!(
             "{}: {} {starts} at a place that is unknown or not corrected: the path from there is not checked ({lines})",
             report.model, between.unchecked
+        );
+        out.push((Status::Warning, words));
+    }
+    if let Some(lines) = first_lines {
+        let words = format!(
+            "{}: nothing tells where the first line or arc of a program or routine starts: the path to its end is not checked ({lines})",
+            report.model
         );
         out.push((Status::Good, words));
     }

@@ -3,7 +3,7 @@
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use truegrind_arm::region::Outside;
 use truegrind_compensation::deviation::{
-    After, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
+    After, BetweenTargets, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
 };
 use truegrind_compensation::plan::Plan;
 use truegrind_math::se3::Pose;
@@ -45,6 +45,8 @@ fn point(
         kind: MotionKind::Linear,
         cutting: true,
         base_from_object: base_from_object(),
+        part: 0,
+        part_from_object: base_from_object(),
         flange_from_tool: Pose::identity(),
         intended: base_from_object() * Pose::translation(at[0], at[1], at[2]),
         normal: surface.then(Vector3::z),
@@ -609,4 +611,66 @@ fn what_stays_is_not_called_a_standard_deviation() {
     }
     assert!(headline(&report).contains("Nothing was corrected: both programs state the same targets"));
     assert!(!headline(&report).contains('σ'), "{}", headline(&report));
+}
+
+/// Points of two parts, or in two axes on one, were registered as if their numbers were of one frame.
+#[test]
+fn the_shape_is_that_of_each_part() {
+    let turned = Pose::from_parts(
+        Translation3::new(400.0, 0.0, 0.0),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI),
+    );
+    let at = [[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [40.0, 30.0, 0.0], [0.0, 30.0, 0.0]];
+    // One displacement in the base: of the second work object in its own axes the opposite one.
+    let points = |part: u32| -> Vec<PathPoint> {
+        let of = |object: usize, k: usize| {
+            let shift = [[1.0, 0.5, 0.2], [-1.0, -0.5, 0.2]][object];
+            let mut point = point(4 * object + k, at[k], Some(shift), Some(shift), false);
+            if object == 1 {
+                let from_object = turned * base_from_object();
+                point.intended = from_object * Pose::translation(at[k][0], at[k][1], at[k][2]);
+                (point.base_from_object, point.part_from_object, point.part) =
+                    (from_object, from_object, part);
+            }
+            point
+        };
+        (0..2).flat_map(|object| (0..4).map(move |k| (object, k))).map(|(object, k)| of(object, k)).collect()
+    };
+    let shape = |points: Vec<PathPoint>| report("m", points).registered_rms_mm(|p| p.before).unwrap();
+    assert!(shape(points(0)) < 1e-9, "{}", shape(points(0)));
+    assert!(shape(points(1)) < 1e-9);
+    // Two parts that are displaced against each other have their shape all the same, one part has not.
+    let apart = |part: u32| {
+        let mut points = points(part);
+        for point in &mut points[4..] {
+            point.before = point.before.map(|d| Deviation { vector_mm: -d.vector_mm, ..d });
+        }
+        shape(points)
+    };
+    assert!(apart(1) < 1e-9 && apart(0) > 0.1, "{} {}", apart(1), apart(0));
+}
+
+/// A line that nobody checked was a remark beside "[ok]".
+#[test]
+fn a_line_that_is_not_checked_is_a_warning() {
+    let mut report = raster("m", After::PredictedRemainder, 1e-4);
+    report.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
+    let judged = |unchecked_lines: Option<&str>, first_lines: Option<&str>| {
+        let between = BetweenTargets {
+            tolerance_mm: 0.05,
+            largest_mm: Some(0.01),
+            beyond: 0,
+            beyond_lines: None,
+            unchecked: usize::from(unchecked_lines.is_some()),
+            unchecked_lines: unchecked_lines.map(str::to_owned),
+            first_lines: first_lines.map(str::to_owned),
+        };
+        let report = PathReport { between: Some(between), ..report.clone() };
+        terminal::document(&view::summary("blade.mod", &[report]), 400)
+    };
+    assert!(judged(None, None).contains("[ok]"), "{}", judged(None, None));
+    assert!(judged(None, Some("line 5")).contains("[ok]"));
+    assert!(judged(None, Some("line 5")).contains("the path to its end is not checked (line 5)"));
+    let text = judged(Some("line 8"), None);
+    assert!(text.contains("[warning]") && text.contains("is not checked (line 8)"), "{text}");
 }

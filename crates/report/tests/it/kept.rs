@@ -46,12 +46,12 @@ fn outside() -> impl Strategy<Value = Option<Outside>> {
 
 prop_compose! {
     fn point()(
-        poses in prop::array::uniform3(pose()),
+        poses in prop::array::uniform4(pose()),
         normal in prop::option::of(prop::array::uniform3(number())),
         joints in prop::array::uniform2(prop::option::of(prop::array::uniform6(number()))),
         (before, after, outside) in (side(), side(), outside()),
         sigmas in prop::array::uniform2(prop::option::of(number())),
-        (index, line, cutting, kind) in (any::<u32>(), any::<u32>(), any::<bool>(), 0..6_usize),
+        (index, line, part, cutting, kind) in (any::<u32>(), any::<u32>(), any::<u32>(), any::<bool>(), 0..6_usize),
         (instruction, reason) in (".*", prop::option::of(".*")),
         status in prop::sample::select(vec![Status::Changed, Status::Left, Status::Refused, Status::Flagged]),
     ) -> PathPoint {
@@ -67,6 +67,8 @@ prop_compose! {
             kind: kinds[kind],
             cutting,
             base_from_object: poses[0],
+            part,
+            part_from_object: poses[3],
             flange_from_tool: poses[1],
             intended: poses[2],
             normal: normal.map(Vector3::from),
@@ -85,14 +87,17 @@ prop_compose! {
 
 fn between() -> impl Strategy<Value = BetweenTargets> {
     let lines = || prop::option::of(Just("lines 3, 7".to_owned()));
-    (number(), prop::option::of(number()), (0..9_usize, lines()), (0..9_usize, lines())).prop_map(
-        |(tolerance_mm, largest_mm, (beyond, beyond_lines), (unchecked, unchecked_lines))| BetweenTargets {
-            tolerance_mm,
-            largest_mm,
-            beyond,
-            beyond_lines,
-            unchecked,
-            unchecked_lines,
+    (number(), prop::option::of(number()), (0..9_usize, lines()), (0..9_usize, lines()), lines()).prop_map(
+        |(tolerance_mm, largest_mm, (beyond, beyond_lines), (unchecked, unchecked_lines), first_lines)| {
+            BetweenTargets {
+                tolerance_mm,
+                largest_mm,
+                beyond,
+                beyond_lines,
+                unchecked,
+                unchecked_lines,
+                first_lines,
+            }
         },
     )
 }

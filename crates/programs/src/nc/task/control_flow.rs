@@ -290,7 +290,8 @@ impl Interpreter<'_, '_> {
                 }
                 self.pass.modal_callee = is_subprogram.map(program);
                 self.state.modal_call = is_subprogram.map(|word| {
-                    let cycle = super::siemens_names::is_cycle(&name(word));
+                    let name = name(word);
+                    let cycle = super::siemens_names::is_cycle(&name) && !self.is_own_program(&name);
                     if cycle { Reason::Cycle } else { Reason::Subprogram }
                 });
                 true

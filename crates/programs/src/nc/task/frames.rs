@@ -159,7 +159,7 @@ impl Interpreter<'_, '_> {
             self.state
                 .groups
                 .set_value(ModalGroup::ProgrammableFrame, u64::from(self.state.programmable_frame.is_none()));
-            self.invalidate_pose();
+            self.without_moving(Self::invalidate_pose);
         } else if word.is("$TC_DP3") || word.is("$TC_DP4") || word.is("$TC_DP5") {
             let (Some(number), Some(1)) = (index(0), index(1)) else { return self.invalidate_tools() };
             let tool = format!("T{number}");
@@ -366,7 +366,7 @@ impl Interpreter<'_, '_> {
             Some(_) => known_value = false,
             None => {}
         }
-        self.assign_offset(name, known_value.then_some(frame));
+        self.without_moving(|this| this.assign_offset(name, known_value.then_some(frame)));
     }
 
     /// Notes whether a work offset has offsets of rotary axes, which its frame does not hold.

@@ -215,17 +215,17 @@ impl<'s> Interpreter<'_, 's> {
             // The default mode of a mill. The name of a kinematic model may follow, whose effect is unknown.
             (b"FUNCTION", b"MODE") => return words[2..] == [b"MILL"],
             (b"FUNCTION", b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
-            (b"TRANS", b"DATUM") => {
+            (b"TRANS", b"DATUM") => self.without_moving(|this| {
                 match third {
                     Some(b"RESET") => {
-                        self.set_datum_shift([Some(0.0); 3]);
-                        self.switch_transform(ModalGroup::RotaryOffset, false);
+                        this.set_datum_shift([Some(0.0); 3]);
+                        this.switch_transform(ModalGroup::RotaryOffset, false);
                     }
-                    Some(b"AXIS") => self.datum_shift(&words[3..]),
-                    _ => self.set_datum_shift([None; 3]),
+                    Some(b"AXIS") => this.datum_shift(&words[3..]),
+                    _ => this.set_datum_shift([None; 3]),
                 }
-                self.invalidate_position();
-            }
+                this.invalidate_position();
+            }),
             (b"TRANS", b"MIRROR") => self.switch_transform(ModalGroup::Mirror, on),
             (b"TRANS", b"ROTATION") => self.switch_transform(ModalGroup::Rotation, on),
             (b"TRANS", b"SCALE") => self.switch_transform(ModalGroup::Scaling, on),
@@ -352,8 +352,10 @@ impl<'s> Interpreter<'_, 's> {
         };
         match number {
             b"7" => {
-                self.datum_shift(values);
-                self.invalidate_position();
+                self.without_moving(|this| {
+                    this.datum_shift(values);
+                    this.invalidate_position();
+                });
             }
             // The title starts the definition; the lines after it hold the values.
             b"8" => self.switch_transform(ModalGroup::Mirror, title || !values.is_empty()),
@@ -379,8 +381,11 @@ impl<'s> Interpreter<'_, 's> {
                 self.switch_transform(ModalGroup::AxisScaling, title || !ends);
             }
             b"247" => {
-                self.select_work_offset(self.preset(first));
-                self.invalidate_datum_shift();
+                let preset = self.preset(first);
+                self.without_moving(|this| {
+                    this.select_work_offset(preset);
+                    this.invalidate_datum_shift();
+                });
             }
             b"220" | b"221" => {
                 self.list_left(block, "CYCL DEF", Reason::Cycle);

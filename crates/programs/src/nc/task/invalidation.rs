@@ -175,6 +175,14 @@ impl Interpreter<'_, '_> {
         }
     }
 
+    /// A change of frames: its coordinates may be unknown from here on, but the arm stands where the motion before ended.
+    pub(super) fn without_moving<T>(&mut self, change: impl FnOnce(&mut Self) -> T) -> T {
+        let preceding = self.state.preceding.clone();
+        let out = change(self);
+        self.state.preceding = preceding;
+        out
+    }
+
     /// The pose is unknown from here on.
     pub(super) fn invalidate_pose(&mut self) {
         self.state.invalidate_position();

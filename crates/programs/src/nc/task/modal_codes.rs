@@ -66,7 +66,7 @@ impl Interpreter<'_, '_> {
                 return self.length(block, code);
             }
             Action::AxialShift => {
-                self.axial_shift(block, code == 580);
+                self.without_moving(|this| this.axial_shift(block, code == 580));
                 return true;
             }
             Action::WorkOffset => self.work_offset(code, block),
@@ -219,7 +219,7 @@ impl Interpreter<'_, '_> {
             Some((letter, None)) => name += &format!("{letter}?"),
             None => {}
         }
-        self.select_work_offset(name);
+        self.without_moving(|this| this.select_work_offset(name));
     }
 
     /// Whether P belongs to another word than the work offset: a call, a dwell, a cycle.

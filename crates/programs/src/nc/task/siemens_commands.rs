@@ -1,5 +1,6 @@
 //! Siemens: named commands.
 
+use super::super::called::program_of;
 use super::super::dialect::Dialect;
 use super::super::modal_group::ModalGroup;
 use super::super::modal_state::MotionMode;
@@ -20,7 +21,7 @@ impl Interpreter<'_, '_> {
                 self.system_variable(word);
             }
         }
-        if self.programmable_frame(block) {
+        if self.without_moving(|this| this.programmable_frame(block)) {
             return true;
         }
         let mut done = false;
@@ -47,7 +48,8 @@ impl Interpreter<'_, '_> {
                     self.invalidate_by_probing();
                     done = true;
                 }
-                WordValue::Arguments { .. } if is_cycle(&name) => {
+                // POCKETP(30,10) calls the program of that name if there is one.
+                WordValue::Arguments { .. } if is_cycle(&name) && !self.is_own_program(&name) => {
                     self.list_left(block, &String::from_utf8_lossy(&name), Reason::Cycle);
                     self.invalidate_position();
                     done = true;
@@ -64,6 +66,11 @@ impl Interpreter<'_, '_> {
             }
         }
         done
+    }
+
+    /// Whether a program of the files has a name.
+    pub(super) fn is_own_program(&self, name: &[u8]) -> bool {
+        self.scan.programs.contains(&program_of(&String::from_utf8_lossy(name)))
     }
 
     /// Transforms between programmed and machine axes. True if the command is one of them.
