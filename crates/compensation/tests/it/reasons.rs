@@ -75,7 +75,7 @@ fn name(why: &OutcomeReason) -> &'static str {
     }
 }
 
-const NAMES: [&str; 23] = [
+const NAMES: [&str; 24] = [
     "program",
     "moving base",
     "joint target",
