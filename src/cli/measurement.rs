@@ -66,6 +66,7 @@ fn empty_table(arguments: &Template) -> anyhow::Result<ExitStatus> {
     let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
     let mut batch = Batch::default();
     let form = names.join(",") + "\n";
+    Batch::check(&[], &[&arguments.output])?;
     spare_filled_in(&arguments.output, &form)?;
     batch.add(&arguments.output, form);
     batch.write()?;

@@ -41,7 +41,9 @@ use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
 use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::region::Outside;
-use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, Role, Switch, TargetValue};
+use truegrind_programs::motion::{
+    Listing, Motion, MotionKind, MotionTarget, Reason, Role, Switch, TargetValue,
+};
 use truegrind_programs::rewrite::{Change, NewTarget};
 
 /// The plan of motions whose targets are solved.
@@ -288,6 +290,11 @@ impl<'a> Planner<'a> {
         }
         let mut starts = Vec::new();
         self.starts.each(index as u32, |start| starts.push(start as usize));
+        // What is counted from the robot's position, mostly the lift of an error handler, has no intended way back.
+        starts.retain(|&start| {
+            let to = self.listing.motions[start].to();
+            to.is_none_or(|to| !matches!(to.value, Err(Reason::CurrentPosition)))
+        });
         if starts.is_empty() {
             return None;
         }

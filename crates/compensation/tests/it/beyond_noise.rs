@@ -181,6 +181,6 @@ fn what_uncertain_causes_explain_is_not_beyond_every_sigma() {
         cosine_rad: 0.0,
         sine_rad: 0.0,
     }));
-    assert!(notes(&known).contains("counted in every σ but not corrected"), "{}", notes(&known));
+    assert!(notes(&known).contains("included in every σ but not corrected"), "{}", notes(&known));
     assert!(!notes(&known).contains("beyond every σ"), "{}", notes(&known));
 }

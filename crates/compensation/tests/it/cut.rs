@@ -56,7 +56,7 @@ fn statuses(done: &Compensated) -> Vec<Status> {
     done.plan.outcomes.iter().map(|outcome| outcome.status).collect()
 }
 
-use Status::{Changed, Left, Refused};
+use Status::{Changed, Flagged, Left, Refused};
 
 #[test]
 fn a_target_that_cannot_be_reached_keeps_its_cut_and_no_other() {
@@ -489,8 +489,10 @@ fn in_part_a_step_between_neighbours_stays_below_the_tolerance() {
     );
     assert_eq!(bytes, source.as_bytes());
     let (loose, bytes) = done(&source, Cuts::Partial, 5.0);
-    let changed = statuses(&loose).iter().filter(|status| **status == Changed).count();
-    assert_eq!(changed, 8, "{:?}", statuses(&loose));
+    // Where the line behind the target out of reach begins is not known: it is corrected, and flagged.
+    let mut expected = [Changed; 9];
+    (expected[4], expected[5]) = (Refused, Flagged);
+    assert_eq!(statuses(&loose), expected);
     assert!(String::from_utf8(bytes).unwrap().contains("! truegrind 1.0.0 model abc partial\n"));
     let again = Task::read(&[("p.mod", b"MODULE M\n! truegrind 1.0.0 model abc partial\nENDMODULE\n")]);
     assert_eq!(

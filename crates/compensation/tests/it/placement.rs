@@ -507,7 +507,7 @@ fn sigma_that_no_reading_has_seen_is_told_as_such() {
     assert_eq!(sigma_mm, same_mm);
     let note = note.unwrap();
     assert!(
-        note.contains(&format!("of the {sigma_mm:.3} mm (1σ) stated for a cut, {sigma_mm:.3} mm")),
+        note.contains(&format!("the {sigma_mm:.3} mm (1σ) stated for a cut come from parameters")),
         "{note}"
     );
     assert!(names.iter().any(|name| note.contains(name)), "{note}");

@@ -243,6 +243,13 @@ fn every_reason_there_is_shows_in_a_program() {
         let source = ["MODULE M\nPROC main()\n", &line(380), &line(900), "ENDPROC\nENDMODULE\n"].concat();
         look(&planned_in_cuts(source.as_bytes(), &known(), &cell, &Options { cuts, ..fine() }));
     }
+    // A routine that no file declares may move the arm.
+    let line = |y: i32, conf: &str| {
+        format!("MoveL [[420,{y},350],[0,0,1,0],{conf},[9E9,9E9,9E9,9E9,9E9,9E9]],v20,fine,tool0;\n")
+    };
+    let lines = [line(-250, "[-1,0,-1,0]"), "SetSpindle 5000;\n".to_owned(), line(250, "[0,0,0,0]")].concat();
+    let source = format!("MODULE M\nPROC main()\n{lines}ENDPROC\nENDMODULE\n");
+    look(&planned(source.as_bytes(), &known(), &cell, &Options { tolerance_mm: 5.0, ..fine() }));
     look(&planned(&refusals, &unsure(), &cell, &fine()));
     let mut elsewhere = known();
     elsewhere.region.spacing_deg = 1.0;
