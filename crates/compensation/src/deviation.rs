@@ -366,7 +366,7 @@ impl PathReport {
     }
 
     /// RMS of the deviation vectors of the cut after the best rigid motion of each part (mm): the shape error of the path, for a base that
-    /// was not measured in the work object. Points that are not corrected count too: the part has them all. `None` for fewer than two
+    /// was not measured in the work object. Points that are not corrected count too: the part has them all. `None` for fewer than three
     /// points.
     pub fn registered_rms_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
         let mut parts: BTreeMap<u32, Vec<Pair>> = BTreeMap::new();
@@ -380,7 +380,7 @@ impl PathReport {
             parts.entry(point.part).or_default().push((intended, reached));
         }
         let count = parts.values().map(Vec::len).sum::<usize>();
-        if count < 2 {
+        if count < 3 {
             return None;
         }
         let mut rest = 0.0;

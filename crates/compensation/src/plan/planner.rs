@@ -310,7 +310,10 @@ impl<'a> Planner<'a> {
         let paths: Vec<Segment<'a>> = starts.iter().filter_map(from).collect();
         let is_whole = is_all_known && paths.len() == starts.len();
         let worst = self.worst_of(index, &paths).and_then(|worst| worst.flag);
-        worst.or((!is_whole).then_some(OutcomeReason::UncheckedPath))
+        // Where nothing else may move the arm, the start that is not known is that of a repetition after an error: it was checked without.
+        let moves_elsewhere =
+            !self.listing.outside_calls.is_empty() || !self.listing.nc.external_calls.is_empty();
+        worst.or((!is_whole && (moves_elsewhere || paths.is_empty())).then_some(OutcomeReason::UncheckedPath))
     }
 
     /// The segment to the end of a motion from one that is not corrected: it begins where the arm is with the original program.

@@ -625,7 +625,7 @@ fn ten_poses_for_what_no_cause_explains_tell_more_than_ten_random_ones() {
     let findings = &found.diagnosis.findings;
     let number = 1 + findings.iter().position(|f| f.effect == "unexplained").unwrap();
     let command = format!(
-        "truegrind plan --robot abb-irb-120 --sensor position --for DIAGNOSIS.json --finding {number}"
+        "truegrind plan --robot abb-irb-120 --sensor position --touched-point 35,10,60 --for DIAGNOSIS.json --finding {number}"
     );
     assert!(findings[number - 1].remedy.contains(&command), "{}", findings[number - 1].remedy);
     let text = serde_json::to_string(&found.diagnosis.clone().with_rows_from_0(&dataset)).unwrap();

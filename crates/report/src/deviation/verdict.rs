@@ -210,11 +210,8 @@ fn different(report: &PathReport, reasons: Vec<String>) -> Vec<String> {
 /// By how much a correction may bend a path without a word (mm RMS).
 const BENT_MM: f64 = 0.05;
 
-/// The shape of a path before and after, over all its cutting points (RMS, mm), where the correction bends it. Two points show a length alone.
+/// The shape of a path before and after, over all its cutting points (RMS, mm), where the correction bends it.
 fn bent(report: &PathReport) -> Option<[f64; 2]> {
-    if report.cut().count() < 3 {
-        return None;
-    }
     let shape_mm = [report.registered_rms_mm(BEFORE)?, report.registered_rms_mm(AFTER)?];
     (shape_mm[1] > shape_mm[0] + BENT_MM).then_some(shape_mm)
 }
