@@ -1,7 +1,7 @@
 //! The targets of a program, solved, and the plans made of them.
 //!
 //! A plan repeats until it agrees with itself. From outside to inside: `compensate` plans again without the motions that the writer refuses;
-//! [`SolvedProgram::plan`] without the lines that joints do not follow; `unchanged_for` with the motions that a neighbour keeps where it is,
+//! `SolvedProgram::plan` without the lines that joints do not follow; `unchanged_for` with the motions that a neighbour keeps where it is,
 //! whose joints then arrive elsewhere from other sides; `target::solve` until these sides agree with the solved targets. Each of the first
 //! three only ever adds motions that stay, so it ends.
 
