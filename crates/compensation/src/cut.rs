@@ -195,9 +195,11 @@ pub(crate) fn follows_position(motion: &Motion) -> bool {
     motion.to().is_some_and(|to| to.value == Err(Reason::CurrentPosition))
 }
 
-/// Whether the arm stops at the end of a motion.
+/// Whether the arm stops at the end of a motion, so that what is cut there may end. The exact stop of an NC program is a property of its corners:
+/// there air moves alone end a cut, with or without one.
 fn stops(motion: &Motion, listing: &Listing) -> bool {
-    listing.zone(motion).is_some_and(|zone| zone.value.as_ref().is_ok_and(|zone| zone.fine))
+    !listing.numbered
+        && listing.zone(motion).is_some_and(|zone| zone.value.as_ref().is_ok_and(|zone| zone.fine))
 }
 
 /// Why a motion remains unmodified, with its status.

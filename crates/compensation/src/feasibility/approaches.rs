@@ -89,7 +89,8 @@ impl<'a> Starts<'a> {
         found.into_iter().collect()
     }
 
-    /// The lines and arcs that must not be corrected because where they begin is refused, with what therefore remains unmodified behind them.
+    /// The lines and arcs that must not be corrected because where they begin is refused, or is an uncorrected place on the part, with what
+    /// therefore remains unmodified behind them.
     pub(crate) fn of_starts_refused(
         &self,
         blocking_reason: Obstacle<'_>,
@@ -107,16 +108,20 @@ impl<'a> Starts<'a> {
                 let mut wedge = None;
                 self.starts.each(index, |start| {
                     let of_cut = || cuts_found.get(&self.cuts.root(start)?).copied();
+                    // A start whose correction is not known is off by about as much as the end.
+                    let mut unknown = true;
                     let refused = match blocking_reason(start) {
                         None => found.get(&start).copied().or_else(of_cut),
                         Some((status, reason)) => {
                             let is_risk = matches!(reason, OutcomeReason::Risk { .. });
-                            Some(reason).filter(|_| status == Status::Refused || is_risk)
+                            let is_refused = status == Status::Refused || is_risk;
+                            unknown = is_refused || shift.exceeds(index, true);
+                            Some(reason).filter(|_| is_refused || self.is_on_part(start))
                         }
                     };
                     let Some(reason) = refused.filter(|_| self.would_tilt(start, index)) else { return };
                     let line = self.listing.motions[start as usize].place.line;
-                    if wedge.is_none() && shift.exceeds(start, true) {
+                    if wedge.is_none() && shift.exceeds(start, unknown) {
                         wedge = Some(OutcomeReason::PartOfCut { line, because: reason.kind() });
                     }
                 });
@@ -158,10 +163,22 @@ impl<'a> Starts<'a> {
         if is_one_cut || self.draws_back(start, index) {
             return false;
         }
-        let is_alone =
-            |index: u32| self.cuts.root(index).is_some_and(|root| self.motions_of(root).len() == 1);
-        let is_approach = self.cuts.root(start).is_none() || is_alone(start) && self.comes_by_air(start);
-        is_approach || !is_alone(index) || self.goes_on[index as usize]
+        self.is_approach(start) || !self.is_alone(index) || self.goes_on[index as usize]
+    }
+
+    /// Whether a motion is a cut by itself.
+    fn is_alone(&self, index: u32) -> bool {
+        self.cuts.root(index).is_some_and(|root| self.motions_of(root).len() == 1)
+    }
+
+    /// Whether a motion leads to the part through the air.
+    fn is_approach(&self, index: u32) -> bool {
+        self.cuts.root(index).is_none() || self.is_alone(index) && self.comes_by_air(index)
+    }
+
+    /// Whether a motion ends where the tool may have been cutting. What is done at a stop there is not known: it may switch the process off, or on.
+    fn is_on_part(&self, index: u32) -> bool {
+        self.cuts.root(index).is_some() && !self.is_approach(index)
     }
 
     /// Whether only air moves lead to where a motion begins.

@@ -291,6 +291,29 @@ fn a_cut_whose_start_is_refused_stays_too() {
     }
 }
 
+/// A contour of stops had a line from an uncorrected corner to a corrected one: a wedge as high as the correction, and a gap where the contour
+/// closes.
+#[test]
+fn a_line_from_an_uncorrected_corner_of_a_contour_stays_too() {
+    let at = |x: f64, y: f64, z: f64| {
+        format!("MoveL [[{x},{y},{z}],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,fine,tool0;\n")
+    };
+    let air = at(360.0, 0.0, 450.0).replace("MoveL", "MoveJ");
+    let [a, b, c] = [at(360.0, 0.0, 400.0), at(390.0, 0.0, 400.0), at(390.0, 20.0, 400.0)];
+    let late = "MoveL Offs(seen,0,0,0),v20,fine,tool0;\n";
+    let away = at(360.0, 0.0, 450.0);
+    let found = |body: &[&str]| statuses(&done(&module(&body.concat()), Cuts::Whole, 0.05).0);
+    // The line that draws the tool back begins at an uncorrected place in the air.
+    let contour = found(&[&air, &a, &b, &c, late, &a, &away, &air]);
+    assert_eq!(contour, [Refused, Refused, Refused, Refused, Left, Refused, Changed, Changed]);
+    // A process may be switched at a stop, but whether off or on is not known.
+    let switched = found(&[&air, &a, &b, &c, late, "SetDO do1,0;\n", &a, &away, &air]);
+    assert_eq!(switched, contour);
+    // An uncorrected approach through the air is none of a contour.
+    let approached = found(&[&air, late, &a, &b, &c, &a, &away]);
+    assert_eq!(approached[2..], [Changed; 5]);
+}
+
 /// A line that is written as joints, and of which no deviation is known, counted as one without a step.
 #[test]
 fn a_step_of_unknown_size_is_a_step() {
@@ -406,6 +429,29 @@ fn a_block_that_may_be_skipped_keeps_the_cut_around_it() {
         .concat();
     let found = cut(two);
     assert_eq!(found, [Refused, Refused, Left, Refused, Changed, Changed, Changed, Changed, Changed]);
+}
+
+/// Under exact stop each line counted as a cut of its own.
+#[test]
+fn an_exact_stop_of_an_nc_program_ends_no_cut() {
+    let head = "; truegrind angles wpr\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[400,0,250],[1,0,0,0]]\n\
+                N1 G90 G71 G17 G54\nN2 T1 D1 M6\nN3 TRAORI\n";
+    let at = |code: &str, x: f64| format!("{code} X{x:.1} Y0 Z20 A180 B0 C0 F600\n");
+    for stop in ["G64\n", "G60\n"] {
+        let blocks = [
+            at("G0", -20.0),
+            at("G1", -10.0),
+            format!("/{}", at("G1", 0.0)),
+            at("G1", 5.0),
+            at("G1", 10.0),
+            at("G0", 20.0),
+        ];
+        let source = [head, stop, &blocks.concat(), "M30\n"].concat();
+        let setup = Setup { angles: Some(Angles::Wpr), ..Setup::default() };
+        let program = Program::Nc(nc::Task::read(&[("p.mpf", source.as_bytes())], &setup));
+        let done = compensate(&program, &known(), &Cell::default(), &Options::default(), None).unwrap();
+        assert!(!done.changed(), "{stop}{:?}", statuses(&done));
+    }
 }
 
 /// Behind a jump, a label or a call a block without its own G0 or G1 may be a cut: the whole of it stays, and with it the air moves.
