@@ -10,6 +10,7 @@ use super::link::{Link, LinkModel};
 use super::model::Model;
 use crate::body::Body;
 use crate::limits::{Limits, SumLimit};
+use truegrind_math::rounding::degrees;
 use truegrind_math::se3::Pose;
 
 /// One link in a file.
@@ -68,9 +69,9 @@ impl From<&Model> for ArmFile {
         let q = model.flange.rotation;
         Self {
             joint_map: std::array::from_fn(|i| std::array::from_fn(|j| model.joint_map[(i, j)])),
-            min_deg: model.limits.min_rad.map(f64::to_degrees),
-            max_deg: model.limits.max_rad.map(f64::to_degrees),
-            speed_deg_s: model.limits.speed_rad_s.map(|s| s.map(f64::to_degrees)),
+            min_deg: model.limits.min_rad.map(degrees),
+            max_deg: model.limits.max_rad.map(degrees),
+            speed_deg_s: model.limits.speed_rad_s.map(|s| s.map(degrees)),
             sum: model.limits.sums.clone(),
             gravity: model.gravity.into(),
             flange_mm: model.flange.translation.vector.into(),
@@ -82,9 +83,9 @@ impl From<&Model> for ArmFile {
                     model: l.model,
                     a_mm: l.a_mm,
                     d_mm: l.d_mm,
-                    alpha_deg: l.alpha_rad.to_degrees(),
-                    theta_deg: l.theta_rad.to_degrees(),
-                    beta_deg: l.beta_rad.to_degrees(),
+                    alpha_deg: degrees(l.alpha_rad),
+                    theta_deg: degrees(l.theta_rad),
+                    beta_deg: degrees(l.beta_rad),
                 })
                 .collect(),
             body: model.bodies.map(|b| b.to_vec()),

@@ -100,7 +100,7 @@ pub fn compensate_prepared(
         let alone =
             if options.cuts == Cuts::Single { Vec::new() } else { air_moves_alone(listing, &planned) };
         let found: BTreeMap<u32, OutcomeReason> = if !alone.is_empty() {
-            alone.into_iter().map(|motion| (motion, OutcomeReason::AirMoveAlone)).collect()
+            alone.into_iter().collect()
         } else if program.accepts(&planned.changes) {
             // Frees the solved targets while the edits are made; no second plan is needed.
             let ((), rewritten) =
@@ -130,36 +130,37 @@ pub fn compensate_prepared(
     }
 }
 
-/// Air moves of an NC program next to a cut that stays uncorrected (before it, or after the last cut of the file): correcting them would
-/// move its start, and the values of the axes that its blocks omit.
-fn air_moves_alone(listing: &Listing, planned: &Plan) -> Vec<u32> {
+/// Air moves of an NC program next to a cut that stays uncorrected: before it and after the last cut of the file, since correcting them would
+/// move its start, and the values of the axes that its blocks omit; and the first one after it, which would draw the tool out of the part
+/// sideways.
+fn air_moves_alone(listing: &Listing, planned: &Plan) -> Vec<(u32, OutcomeReason)> {
     if !listing.numbered {
         return Vec::new();
     }
     let motions = &listing.motions;
     let mut is_corrected = vec![false; motions.len()];
     planned.changes.iter().for_each(|change| is_corrected[change.motion as usize] = true);
+    let is_cut = |at: usize| may_cut(&motions[at]) && !motions[at].rapid;
     let mut out = Vec::new();
-    // Whether the next cut of the file is corrected, or the last one where none follows.
-    let mut beside: Option<(u32, bool)> = None;
-    let mut waiting = Vec::new();
-    for at in (0..motions.len()).rev() {
-        let file = motions[at].place.file;
-        if beside.is_none_or(|(of, _)| of != file) {
-            beside = None;
-            waiting.clear();
-        }
-        if may_cut(&motions[at]) && !motions[at].rapid {
-            if beside.is_none() && !is_corrected[at] {
-                out.append(&mut waiting);
-            }
-            waiting.clear();
-            beside = Some((file, is_corrected[at]));
-        } else if is_corrected[at] {
-            match beside {
-                Some((_, false)) => out.push(at as u32),
-                Some((_, true)) => {}
-                None => waiting.push(at as u32),
+    let mut first = 0;
+    for of_file in motions.chunk_by(|a, b| a.place.file == b.place.file) {
+        let here = first..first + of_file.len();
+        first = here.end;
+        let Some(last_cut) = here.clone().rev().find(|at| is_cut(*at)) else { continue };
+        let mut cut = last_cut;
+        for at in here.clone().rev() {
+            if is_cut(at) {
+                cut = at;
+            } else if is_corrected[at] && !is_corrected[cut] {
+                out.push((at as u32, OutcomeReason::AirMoveAlone));
+            } else if is_corrected[at]
+                && at > here.start
+                && is_cut(at - 1)
+                && !is_corrected[at - 1]
+                && !is_cut(at + 1)
+            {
+                let line = motions[at - 1].place.line;
+                out.push((at as u32, OutcomeReason::DepartureFromUnchangedCut { line }));
             }
         }
     }

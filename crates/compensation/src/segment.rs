@@ -6,5 +6,6 @@ pub mod corner;
 pub mod curve;
 pub(crate) mod joint_speed;
 pub(crate) mod line;
+pub(crate) mod rounded_end;
 pub(crate) mod segment_plan;
 pub(crate) mod wrist_interpolation;

@@ -105,7 +105,12 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
     let ends = by_motion(&before, task.original.motions.len());
     let after = after.as_ref().map(|(listing, after)| {
         let of_motions = by_motion(&after.ends, listing.motions.len());
-        RewrittenRun { listing, run: after, partners: align(&ends, &of_motions), ends: of_motions }
+        RewrittenRun {
+            listing,
+            run: after,
+            partners: align([task.original, listing], &ends, &of_motions),
+            ends: of_motions,
+        }
     });
     let differences =
         after.as_ref().map_or_else(Vec::new, |RewrittenRun { listing, ends: after, partners, .. }| {

@@ -19,7 +19,8 @@
 //!
 //! **Expected result.** Without forgetting, RLS equals batch least squares of one linearisation, to rounding. A gap
 //! between RLS and LM must have another cause; the three LM variants separate memory, weights and early stopping. The
-//! errors before calibration differ between the paper's own methods (0.571 and 0.743 mm), which no method can cause.
+//! errors before calibration differ between the paper's own methods in the identification poses (0.571 and 0.743 mm): "before" is by the
+//! parameters of the period before, which are each method's own.
 
 pub(crate) mod settings;
 mod arm;

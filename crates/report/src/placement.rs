@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::table::{Column, Table};
 use truegrind_calibration::identification::verdict::{LEAST_PERCENT, MOST_PERCENT, percent_of};
+use truegrind_compensation::line_list::numbered;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
@@ -72,7 +73,41 @@ pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
         format!("{named}: no motion with {with} is corrected; {}", displacement(placement))
     };
     let apart = apart(plan, what, |placement| names(placement).any(|name| corrected.contains(name)));
-    plan.placements.iter().map(of).chain(apart).collect()
+    let left = plan.placements.iter().filter_map(|placement| left_behind(placement, plan, listing));
+    plan.placements.iter().map(of).chain(apart).chain(left).collect()
+}
+
+/// By how much cuts may come apart without a word (mm RMS).
+const APART_MM: f64 = 0.05;
+
+/// Sentence for a work object whose placement is corrected in some cuts and not in others: passes over one contour come apart.
+fn left_behind(placement: &ObjectPlacement, plan: &Plan, listing: &Listing) -> Option<String> {
+    if placement.applied != Placement::Absolute {
+        return None;
+    }
+    let is_here = |cut: &&CutRisk| {
+        let first = cut.motions.first().and_then(|motion| listing.motions.get(*motion as usize));
+        let object = first.and_then(|motion| listing.work_object(motion));
+        object.is_some_and(|object| names(placement).any(|name| name == object.name))
+    };
+    let cuts = || plan.cuts.iter().filter(is_here);
+    let left: Vec<&CutRisk> = cuts().filter(|cut| !cut.corrected && cut.deviation_mm > APART_MM).collect();
+    if left.is_empty() || !cuts().any(|cut| cut.corrected) {
+        return None;
+    }
+    let mm = left.iter().map(|cut| cut.deviation_mm).fold(0.0, f64::max);
+    let starts = left.iter().filter_map(|cut| listing.motions.get(*cut.motions.first()? as usize));
+    let lines = numbered(&listing.files, starts.map(|motion| motion.place)).unwrap_or_default();
+    let (begin, stay) = if left.len() == 1 {
+        ("the cut that begins", "stays where it is")
+    } else {
+        ("cuts that begin", "stay where they are")
+    };
+    let named = named(placement, object_word(listing));
+    Some(format!(
+        "{named}: {begin} at {lines} {stay}, while others move by the correction: passes over one contour then lie up to {mm:.3} mm apart. \
+         Correct all of them, or the shape alone (--placement shape)"
+    ))
 }
 
 /// Sentence for stationary objects of which some are corrected in placement and others are not: the distances between them change.

@@ -37,15 +37,17 @@ fn of_position(sensor: Sensor) -> f64 {
     if sensor == Sensor::Cable { 3_f64.sqrt() } else { 1.0 }
 }
 
-/// Mean square error of a row (mm²) from fitted and held-out rows together. Parameters, in rows that would determine them, take up that much
-/// of the fitted rows; more than half of these are not taken off, since priors hold the rest.
+/// Mean square error of a row (mm²) from fitted and held-out rows together. p parameters, in rows that would determine them, make the errors of
+/// n fitted rows smaller by 1 − p/n, and those of held-out rows larger by 1 + p/n, since they are uncertain, which is stated elsewhere. More
+/// than half of the fitted rows are not taken for p, since priors hold the rest.
 fn mean_square(errors: &StageErrors, parameters: f64) -> f64 {
     let of = |summary: &ErrorSummary| match summary.count {
         0 => (0.0, 0.0),
         count => (count as f64, count as f64 * summary.rmse.powi(2)),
     };
     let ((fitted, of_fitted), (held_out, of_held_out)) = (of(&errors.fitted), of(&errors.held_out));
-    (of_fitted + of_held_out) / (fitted - parameters.min(0.5 * fitted) + held_out)
+    let share = if fitted > 0.0 { (parameters / fitted).min(0.5) } else { 0.0 };
+    (of_fitted + of_held_out) / (fitted * (1.0 - share) + held_out * (1.0 + share))
 }
 
 /// The same of a fit with so many parameters.

@@ -24,7 +24,7 @@ use crate::identification::rounding::{
     AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance, rounding_floor_mm,
 };
 use crate::identification::sessions::set_up_anew;
-use crate::identification::solver::{Family, SOLVERS, Solver};
+use crate::identification::solver::{Family, SOLVERS, Scope, Solver};
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::identification::unseen_target::unseen_target;
@@ -657,6 +657,13 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     if options.solver.as_printed {
         verdict.fail(format!(
             "{} has no priors: undetermined parameters moved freely, so the result is a comparison and not a model",
+            options.solver.name
+        ));
+    }
+    if options.solver.network == Some(Scope::Alone) {
+        verdict.fail(format!(
+            "{} fits no geometry: between the measured poses, and with another tool, nothing bounds its error, so the result is a comparison and \
+             not a model",
             options.solver.name
         ));
     }

@@ -1,9 +1,10 @@
 //! The starts of cuts: a line or arc is corrected together with the place where it begins or not at all, since between a corrected and an
 //! uncorrected end it becomes a wedge as high as the correction.
 //!
-//! A line on which nothing is cut may become one: one that goes along with the robot's own position, one that draws the tool straight back
-//! along its own axis, and one by itself behind which only air moves follow (after a longer cut). Without these exceptions one refused line
-//! would leave a whole program that moves by lines alone.
+//! A contour with a stop at each corner is thus corrected as a whole or not at all. Lines on which nothing is cut may become wedges: those that
+//! go along with the robot's own position, those that draw the tool straight back along its own axis, and, where one remains unmodified after
+//! a longer cut, a line by itself behind which only air moves follow. A line from an unmodified approach through the air may too, unless the
+//! approach was refused: without these exceptions one line would leave a whole program that moves by lines alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,7 +14,7 @@ use crate::cut::{CutsOf, Obstacle, StartsOf, follows_position, may_cut};
 use crate::deviation::Status;
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget::MANY;
-use truegrind_programs::motion::{Listing, Motion, MotionKind};
+use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
 
 /// The starts of the lines and arcs of a program.
 pub(crate) struct Starts<'a> {
@@ -74,7 +75,7 @@ impl<'a> Starts<'a> {
                 if is_left(start)
                     || found.contains_key(&start)
                     || !shift.exceeds(start, false)
-                    || !self.would_tilt(start, index)
+                    || !self.holds_its_start(start, index)
                 {
                     return;
                 }
@@ -91,7 +92,7 @@ impl<'a> Starts<'a> {
 
     /// The lines and arcs that must not be corrected because where they begin is refused, or is an uncorrected place on the part, with what
     /// therefore remains unmodified behind them.
-    pub(crate) fn of_starts_refused(
+    pub(crate) fn of_starts_uncorrected(
         &self,
         blocking_reason: Obstacle<'_>,
         shift: &Shift<'_>,
@@ -110,16 +111,17 @@ impl<'a> Starts<'a> {
                     let of_cut = || cuts_found.get(&self.cuts.root(start)?).copied();
                     // A start whose correction is not known is off by about as much as the end.
                     let mut unknown = true;
-                    let refused = match blocking_reason(start) {
+                    let uncorrected = match blocking_reason(start) {
                         None => found.get(&start).copied().or_else(of_cut),
                         Some((status, reason)) => {
-                            let is_risk = matches!(reason, OutcomeReason::Risk { .. });
-                            let is_refused = status == Status::Refused || is_risk;
+                            let is_refused =
+                                status == Status::Refused || matches!(reason, OutcomeReason::Risk { .. });
                             unknown = is_refused || shift.exceeds(index, true);
                             Some(reason).filter(|_| is_refused || self.is_on_part(start))
                         }
                     };
-                    let Some(reason) = refused.filter(|_| self.would_tilt(start, index)) else { return };
+                    let may_be_wedge = self.may_be_wedge(start, index) && !self.is_drawn_back(start);
+                    let Some(reason) = uncorrected.filter(|_| may_be_wedge) else { return };
                     let line = self.listing.motions[start as usize].place.line;
                     if wedge.is_none() && shift.exceeds(start, unknown) {
                         wedge = Some(OutcomeReason::PartOfCut { line, because: reason.kind() });
@@ -133,6 +135,42 @@ impl<'a> Starts<'a> {
             }
             if found.len() == before {
                 break;
+            }
+        }
+        found.into_iter().collect()
+    }
+
+    /// The motions that lead from an uncorrected place on the part away from it, to where no corrected line or arc begins: corrected, they
+    /// would draw the tool out of the part sideways.
+    pub(crate) fn of_departures(
+        &self,
+        blocking_reason: Obstacle<'_>,
+        shift: &Shift<'_>,
+    ) -> Vec<(u32, OutcomeReason)> {
+        // The motions with an uncorrected place on the part before them are few, the others need no list of what follows them.
+        let mut found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
+        for index in 0..self.listing.motions.len() as u32 {
+            if self.is_path(index) && !self.is_drawn_back(index) || blocking_reason(index).is_some() {
+                continue;
+            }
+            self.starts.each(index, |start| {
+                let is_uncorrected = blocking_reason(start).is_some() && self.is_on_part(start);
+                if is_uncorrected && shift.exceeds(start, shift.exceeds(index, true)) {
+                    let line = self.listing.motions[start as usize].place.line;
+                    found.entry(index).or_insert(OutcomeReason::DepartureFromUnchangedCut { line });
+                }
+            });
+        }
+        if found.is_empty() {
+            return Vec::new();
+        }
+        for index in (0..self.listing.motions.len() as u32).filter(|index| self.is_path(*index)) {
+            if blocking_reason(index).is_none() {
+                self.starts.each(index, |start| {
+                    if !self.is_drawn_back(start) || self.draws_near(start, index) {
+                        found.remove(&start);
+                    }
+                });
             }
         }
         found.into_iter().collect()
@@ -157,13 +195,31 @@ impl<'a> Starts<'a> {
     }
 
     /// Whether the tool may cut on the way from a start, so that a wedge would show in the part.
-    fn would_tilt(&self, start: u32, index: u32) -> bool {
+    fn may_be_wedge(&self, start: u32, index: u32) -> bool {
         // Within a cut the steps between neighbours are judged.
         let is_one_cut = self.cuts.root(start).is_some() && self.cuts.root(start) == self.cuts.root(index);
-        if is_one_cut || self.draws_back(start, index) {
-            return false;
-        }
-        self.is_approach(start) || !self.is_alone(index) || self.goes_on[index as usize]
+        !is_one_cut && !self.draws_back(start, index)
+    }
+
+    /// Whether a line that remains unmodified must keep its start unmodified: all but a line by itself behind which only air moves follow.
+    fn holds_its_start(&self, start: u32, index: u32) -> bool {
+        let is_approach =
+            self.cuts.root(start).is_none() || self.is_alone(start) && self.comes_by_air(start) == Some(true);
+        self.may_be_wedge(start, index)
+            && (is_approach || !self.is_alone(index) || self.goes_on[index as usize])
+    }
+
+    /// Whether a motion ends where the tool may have been cutting: not at the end of an approach through the air, nor where it was drawn back.
+    /// What is done at a stop there is not known: it may switch the process off, or on.
+    fn is_on_part(&self, index: u32) -> bool {
+        let is_approach = || self.is_alone(index) && self.comes_by_air(index) != Some(false);
+        self.meets_part(index) && !is_approach() && !self.is_drawn_back(index)
+    }
+
+    /// Whether the tool may meet the part during a motion. What an unknown instruction does is judged by the steps beside it.
+    fn meets_part(&self, index: u32) -> bool {
+        let motion = &self.listing.motions[index as usize];
+        self.is_path(index) || motion.own_reason == Some(Reason::Probe)
     }
 
     /// Whether a motion is a cut by itself.
@@ -171,40 +227,44 @@ impl<'a> Starts<'a> {
         self.cuts.root(index).is_some_and(|root| self.motions_of(root).len() == 1)
     }
 
-    /// Whether a motion leads to the part through the air.
-    fn is_approach(&self, index: u32) -> bool {
-        self.cuts.root(index).is_none() || self.is_alone(index) && self.comes_by_air(index)
-    }
-
-    /// Whether a motion ends where the tool may have been cutting. What is done at a stop there is not known: it may switch the process off, or on.
-    fn is_on_part(&self, index: u32) -> bool {
-        self.cuts.root(index).is_some() && !self.is_approach(index)
-    }
-
-    /// Whether only air moves lead to where a motion begins.
-    fn comes_by_air(&self, index: u32) -> bool {
-        let (mut any, mut all) = (false, true);
+    /// Whether only air moves, and lines that draw the tool back, lead to where a motion begins; `None` where nothing is known to.
+    fn comes_by_air(&self, index: u32) -> Option<bool> {
+        let mut by_air = None;
         self.starts.each(index, |start| {
-            any = true;
-            all &= !may_cut(&self.listing.motions[start as usize]);
+            let is_air = !self.meets_part(start) || self.is_drawn_back(start);
+            by_air = Some(by_air.unwrap_or(true) && is_air);
         });
-        any && all
+        by_air
+    }
+
+    /// Whether a line draws the tool back from wherever it may begin.
+    fn is_drawn_back(&self, index: u32) -> bool {
+        let mut all = None;
+        self.starts.each(index, |start| all = Some(all.unwrap_or(true) && self.draws_back(start, index)));
+        all == Some(true)
+    }
+
+    /// Whether a line leads the tool straight forwards along its own axis.
+    fn draws_near(&self, start: u32, index: u32) -> bool {
+        self.along_tool_mm(start, index).is_some_and(|mm| mm >= DRAWN_BACK_MM)
     }
 
     /// Whether a line draws the tool straight back along its own axis.
     fn draws_back(&self, start: u32, index: u32) -> bool {
+        self.along_tool_mm(start, index).is_some_and(|mm| mm <= -DRAWN_BACK_MM)
+    }
+
+    /// How far a line leads along the axis of the tool (mm); `None` where it does not, or that is unknown.
+    fn along_tool_mm(&self, start: u32, index: u32) -> Option<f64> {
         let [from, to] = [start, index].map(|index| &self.listing.motions[index as usize]);
-        let ends =
-            |motion: &Motion| Some((motion.cartesian_end()?.pose(), motion.work_object?, motion.tool?));
-        let (Some((from, object, tool)), Some((end, same_object, same_tool))) = (ends(from), ends(to)) else {
-            return false;
-        };
+        let end = |motion: &Motion| Some((motion.cartesian_end()?.pose(), motion.work_object?, motion.tool?));
+        let ((from, object, tool), (end, same_object, same_tool)) = (end(from)?, end(to)?);
         let way = end.translation.vector - from.translation.vector;
-        let back = -(from.rotation * nalgebra::Vector3::z());
-        to.kind == MotionKind::Linear
+        let along = way.dot(&(from.rotation * nalgebra::Vector3::z()));
+        let is_straight = to.kind == MotionKind::Linear
             && (object, tool) == (same_object, same_tool)
-            && way.norm() >= DRAWN_BACK_MM
-            && way.dot(&back) >= STRAIGHT_BACK * way.norm()
+            && along.abs() >= ALONG_TOOL * way.norm();
+        is_straight.then_some(along)
     }
 }
 
@@ -214,5 +274,5 @@ const PASSES: usize = 4;
 /// A tool that is drawn back by this much no longer cuts (mm).
 const DRAWN_BACK_MM: f64 = 5.0;
 
-/// Cosine of the largest angle between the way of a tool that is drawn back and its axis.
-const STRAIGHT_BACK: f64 = 0.95;
+/// Cosine of the largest angle between the axis of the tool and a way along it.
+const ALONG_TOOL: f64 = 0.95;

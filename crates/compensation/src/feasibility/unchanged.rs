@@ -36,8 +36,7 @@ pub(crate) fn unchanged_motions(
     let mut budget = SearchBudget::of(search_budget::WAYS);
     let mut forbidden = forbid_segments(listing, solved, frame_table, arms, options, None, &mut budget);
     let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
-    // Lines of NC programs have no stops, and their air moves are judged once they are written.
-    let has_starts = !listing.numbered && options.cuts != Cuts::Single;
+    let has_starts = options.cuts != Cuts::Single;
     let starts = has_starts.then(|| Starts::of(listing, cuts, options.cuts == Cuts::Whole));
     loop {
         let before = out.len();
@@ -60,13 +59,21 @@ pub(crate) fn unchanged_motions(
             end.map(SolvedTarget::shift_mm)
         };
         let shift = Shift { mm: &known_mm, tolerance_mm: options.tolerance_mm };
-        let of_starts = starts.as_ref().map(|starts| {
-            let left = starts.of_cuts_left(&kept, &shift);
-            (left, starts.of_starts_refused(&kept, &shift))
-        });
-        let (approaches, from_refused) = of_starts.unwrap_or_default();
-        out.extend(approaches);
-        out.extend(from_refused);
+        let of_starts: Vec<(u32, OutcomeReason)> = starts
+            .iter()
+            .flat_map(|starts| {
+                // Air moves of NC programs are judged once they are written.
+                let [approaches, departures] = if listing.numbered {
+                    [Vec::new(), Vec::new()]
+                } else {
+                    [starts.of_cuts_left(&kept, &shift), starts.of_departures(&kept, &shift)]
+                };
+                [approaches, starts.of_starts_uncorrected(&kept, &shift), departures].concat()
+            })
+            .collect();
+        for (motion, reason) in of_starts {
+            out.entry(motion).or_insert(reason);
+        }
         out.extend(more);
         if out.len() == before && !forbidden {
             return out;

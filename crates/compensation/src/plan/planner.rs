@@ -34,6 +34,7 @@ use crate::search_budget;
 use crate::segment::corner::{CUT_MM, cut_of_lines};
 use crate::segment::joint_speed::{Pace, fastest};
 use crate::segment::line::{Segment, SegmentEnd, midpoint_deviations};
+use crate::segment::rounded_end::RoundedEnd;
 use crate::segment::segment_plan::{SegmentPlan, corner};
 use crate::target::original_joints::BranchGuess;
 use crate::target::solve::reserve_memory;
@@ -227,6 +228,45 @@ impl<'a> Planner<'a> {
         out
     }
 
+    /// How the path is rounded where a line begins and where it ends.
+    fn rounded_ends(&self, index: usize) -> [RoundedEnd; 2] {
+        let start = self.listing.motions[index].previous.map(|start| start as usize);
+        let behind = self.listing.motions.get(index + 1);
+        let is_next = behind.is_some_and(|behind| behind.previous == Some(index as u32));
+        let end = is_next.then_some(index + 1);
+        let before = start.and_then(|start| self.listing.motions[start].previous);
+        [
+            self.rounded_end(before.map(|before| before as usize), start, Some(index)),
+            self.rounded_end(start, Some(index), end),
+        ]
+    }
+
+    /// How the path is rounded at the end of the second of three motions.
+    fn rounded_end(&self, before: Option<usize>, corner: Option<usize>, behind: Option<usize>) -> RoundedEnd {
+        let points = || {
+            let [before, corner, behind] = [before?, corner?, behind?].map(|index| self.solved.of(index));
+            let [before, corner, behind] =
+                [before.last()?, corner.last()?, behind.first()?].map(|target| target.as_ref().ok());
+            let targets = [before?, corner?, behind?];
+            let is_one = targets.iter().all(|target| target.frames_index == targets[1].frames_index);
+            is_one.then(|| targets.map(|target| target.intended.position_mm()))
+        };
+        let zone = |index: usize| {
+            let zone = self.listing.zone(&self.listing.motions[index])?.value.as_ref().ok()?;
+            (!zone.fine).then_some(zone.tcp_mm)
+        };
+        let is_path = |index: Option<usize>| {
+            let kind = index.map(|index| self.listing.motions[index].kind);
+            matches!(kind, Some(MotionKind::Linear | MotionKind::Circular))
+        };
+        match (points(), corner.and_then(zone)) {
+            (Some(points), Some(zone_mm)) if is_path(corner) && is_path(behind) => {
+                RoundedEnd::of(&points, zone_mm)
+            }
+            _ => RoundedEnd::default(),
+        }
+    }
+
     /// The segment to the end of a motion, in the frames of that motion; `None` unless both ends are corrected.
     fn path(&self, index: usize) -> Option<Segment<'a>> {
         let motion = &self.listing.motions[index];
@@ -273,8 +313,9 @@ impl<'a> Planner<'a> {
         let via = circle_point(self.solved.of(index));
         let middles = midpoint_deviations(&paths.iter().collect::<Vec<_>>(), self.arms, self.options.emit);
         let plans = paths.iter().zip(middles);
-        let plans = plans
-            .map(|(path, middle)| SegmentPlan::of(&motion, Some(path), via, middle, self.arms, self.options));
+        let plans = plans.map(|(path, middle)| {
+            SegmentPlan::of(&motion, Some(path), via, middle, &Default::default, self.arms, self.options)
+        });
         // A segment whose deviation is unknown is the worst.
         let rank = |plan: &SegmentPlan| plan.path_deviation_mm.unwrap_or(f64::INFINITY);
         plans.max_by(|a, b| rank(a).total_cmp(&rank(b)))
@@ -372,7 +413,8 @@ impl<'a> Planner<'a> {
         let path = self.path(previous)?;
         let middle = midpoint_deviations(&[&path], self.arms, self.options.emit)[0];
         let via = circle_point(self.solved.of(previous));
-        deviation(&SegmentPlan::of(before, Some(&path), via, middle, self.arms, self.options))
+        let corners = || self.rounded_ends(previous);
+        deviation(&SegmentPlan::of(before, Some(&path), via, middle, &corners, self.arms, self.options))
     }
 }
 
@@ -426,7 +468,9 @@ fn plan_motion<'a>(
     }
     let solved_targets = || targets.iter().flatten();
     // The segment from the previous motion.
-    let segment_plan = SegmentPlan::of(motion, path, circle_point(targets), middle_mm, arms, options);
+    let corners = || job.rounded_ends(index);
+    let segment_plan =
+        SegmentPlan::of(motion, path, circle_point(targets), middle_mm, &corners, arms, options);
     (outcome.path_deviation_mm, outcome.inserted) =
         (segment_plan.path_deviation_mm.into(), segment_plan.before.len() as u32);
     // All other flags hold only for the guessed configuration, so this one takes precedence.

@@ -131,6 +131,11 @@ pub enum OutcomeReason {
         /// Line of its first motion, 1-based.
         line: u32,
     },
+    /// A cut that remains unmodified ends where this motion begins; to a corrected end it would draw the tool out of the part sideways.
+    DepartureFromUnchangedCut {
+        /// Line of the last motion of the cut, 1-based.
+        line: u32,
+    },
     /// The next motion remains unmodified and starts here; from a corrected start it would pass too close to a singularity.
     StartOfSingularPath {
         /// Line of that motion, 1-based.
@@ -268,6 +273,9 @@ impl OutcomeReason {
             OutcomeReason::StartOfUnchangedCut { .. } => {
                 "a cut that is not corrected starts here: correcting its start would tilt its first line"
             }
+            OutcomeReason::DepartureFromUnchangedCut { .. } => {
+                "it leaves the part at the end of a cut that is not corrected: corrected, it would draw the tool sideways"
+            }
             OutcomeReason::StartOfSingularPath { .. } => {
                 "a motion that is not corrected starts here: from a corrected start it would pass too close to a singularity"
             }
@@ -350,6 +358,7 @@ impl OutcomeReason {
             | OutcomeReason::HalfTurn { line }
             | OutcomeReason::StartOfUnchangedArc { line }
             | OutcomeReason::StartOfUnchangedCut { line }
+            | OutcomeReason::DepartureFromUnchangedCut { line }
             | OutcomeReason::StartOfSingularPath { line }
             | OutcomeReason::StartOfLimitedPath { line, .. } => Some(line),
             _ => None,
@@ -493,6 +502,10 @@ impl fmt::Display for OutcomeReason {
             OutcomeReason::StartOfUnchangedCut { line } => write!(
                 f,
                 "the cut at line {line} is not corrected and starts here: correcting its start would tilt its first line"
+            ),
+            OutcomeReason::DepartureFromUnchangedCut { line } => write!(
+                f,
+                "it leaves the part where the cut at line {line} ends, which is not corrected: corrected, it would draw the tool sideways"
             ),
             OutcomeReason::StartOfSingularPath { line } => write!(
                 f,

@@ -11,6 +11,7 @@ use crate::frames::frame_pair::ResolvedFrames;
 use crate::options::{Emit, Options};
 use crate::segment::condition_schedule::{CHORD_MM, ConditionSchedule};
 use crate::segment::curve::{between, lateral_offset};
+use crate::segment::rounded_end::RoundedEnd;
 use truegrind_arm::model::Joints;
 use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::{Pose, angle_bound_rad};
@@ -301,12 +302,52 @@ const CLEARLY_STRAIGHT_MM: f64 = 0.01;
 ///
 /// `None` where an inserted target would turn a joint far more than the same correction elsewhere, near a singularity; where
 /// the arm cannot follow even with inserted targets; and where a link with backlash would not end on its planned side.
+///
+/// Where that is possible, targets keep clear of the rounded corners at the ends. Otherwise what they make of the corners counts: they are
+/// worth less than none where the corners move by more than the line is straightened.
 pub(crate) fn insertions(
     path: &Segment<'_>,
+    corners: &[RoundedEnd; 2],
     arms: &Arms<'_>,
     options: &Options,
-) -> Option<(Vec<Extra>, f64)> {
-    let mut best = split_line(path, arms, options.emit, options.tolerance_mm);
+) -> Option<Insertions> {
+    let length_mm = distance(&path.from.intended.translation.vector, &path.to.intended.translation.vector);
+    let free = corners.map(|corner| corner.free_mm() / length_mm);
+    let clear_of_corners = [free[0], 1.0 - free[1]];
+    let anywhere = [0.0, 1.0];
+    let whole = insertions_within(anywhere, path, corners, arms, options);
+    if free == [0.0; 2] || !(clear_of_corners[0] < clear_of_corners[1]) {
+        return whole;
+    }
+    let clear = insertions_within(clear_of_corners, path, corners, arms, options);
+    [clear, whole].into_iter().flatten().min_by(|a, b| a.worst_mm().total_cmp(&b.worst_mm()))
+}
+
+/// The targets to insert into a line.
+pub(crate) struct Insertions {
+    pub(crate) before: Vec<Extra>,
+    /// Largest deviation from the intended line that remains (mm).
+    pub(crate) remaining_mm: f64,
+    /// By how much they move the path in the corners at its ends (mm).
+    pub(crate) corners_moved_mm: f64,
+}
+
+impl Insertions {
+    /// The larger of the two (mm).
+    pub(crate) fn worst_mm(&self) -> f64 {
+        self.remaining_mm.max(self.corners_moved_mm)
+    }
+}
+
+/// The targets to insert between two shares of a line.
+fn insertions_within(
+    shares: [f64; 2],
+    path: &Segment<'_>,
+    corners: &[RoundedEnd; 2],
+    arms: &Arms<'_>,
+    options: &Options,
+) -> Option<Insertions> {
+    let mut best = split_line(path, shares, arms, options.emit, options.tolerance_mm);
     if let Some(play_operator) = path.play_operator(arms) {
         let mut aim_mm = options.tolerance_mm;
         best.remaining_mm = deviation_with_play(path, &best, &play_operator, arms, options.emit);
@@ -315,7 +356,7 @@ pub(crate) fn insertions(
                 break;
             }
             aim_mm *= 0.5;
-            let mut finer = split_line(path, arms, options.emit, aim_mm);
+            let mut finer = split_line(path, shares, arms, options.emit, aim_mm);
             finer.remaining_mm = deviation_with_play(path, &finer, &play_operator, arms, options.emit);
             if finer.remaining_mm < best.remaining_mm {
                 best = finer;
@@ -336,8 +377,17 @@ pub(crate) fn insertions(
             &|u| motor_joints_on(path, &best, u, arms, options.emit),
             arms,
         );
-    (goes && !best.inserted.iter().any(leap))
-        .then(|| (best.inserted.iter().map(extra).collect(), best.remaining_mm))
+    let length_mm = distance(&path.from.intended.translation.vector, &path.to.intended.translation.vector);
+    let [first, last] = [best.inserted.first(), best.inserted.last()].map(|target| target.map(|at| at.share));
+    let moved = |corner: &RoundedEnd, share: Option<f64>| {
+        share.map_or(0.0, |share| corner.moved_mm(share * length_mm))
+    };
+    let corners_moved_mm = moved(&corners[0], first).max(moved(&corners[1], last.map(|share| 1.0 - share)));
+    (goes && !best.inserted.iter().any(leap)).then(|| Insertions {
+        before: best.inserted.iter().map(extra).collect(),
+        remaining_mm: best.remaining_mm,
+        corners_moved_mm,
+    })
 }
 
 /// How often the lines between inserted targets are refined.
@@ -357,12 +407,19 @@ struct SplitLine<'a> {
     remaining_mm: f64,
 }
 
-/// Splits a line so that its pieces, with every link on its flank, deviate by at most `aim_mm`.
-fn split_line<'a>(path: &Segment<'a>, arms: &Arms<'_>, emit: Emit, aim_mm: f64) -> SplitLine<'a> {
+/// Splits a line so that its pieces, with every link on its flank, deviate by at most `aim_mm`. Only what takes up backlash is inserted
+/// outside of `shares`.
+fn split_line<'a>(
+    path: &Segment<'a>,
+    shares: [f64; 2],
+    arms: &Arms<'_>,
+    emit: Emit,
+    aim_mm: f64,
+) -> SplitLine<'a> {
     let Segment { from, to, schedule } = path;
     let mut out = SplitLine { inserted: Vec::new(), remaining_mm: 0.0 };
     let mut begin = InsertedTarget { share: 0.0, at: *from };
-    let splitting = LineSplitter { arms, emit, aim_mm };
+    let splitting = LineSplitter { shares, arms, emit, aim_mm };
     for turn in schedule.changes(from) {
         let at = |condition_index: usize| {
             end_between(from, to, turn.share, condition_index, arms)
@@ -455,8 +512,13 @@ fn end_between<'a>(
 /// At most 63 targets on one line: if more are needed, the line cannot be followed.
 const MAX_DEPTH: usize = 6;
 
+/// Smallest share of a piece that is split off: more is gained elsewhere.
+const SMALLEST_PIECE: f64 = 0.05;
+
 /// Bisection of a line until its pieces are straight.
 struct LineSplitter<'s> {
+    /// Between which shares of the line it is divided.
+    shares: [f64; 2],
     arms: &'s Arms<'s>,
     emit: Emit,
     aim_mm: f64,
@@ -473,15 +535,18 @@ impl LineSplitter<'_> {
         let (from, to, condition_index) = (&begin.at, &end.at, end.at.condition_index);
         let middle = offset_at(from, to, 0.5, condition_index, self.arms, self.emit);
         let deviation = deviation_without_play(from, to, condition_index, self.arms, self.emit, middle);
-        let halves = if deviation <= self.aim_mm || depth == 0 {
+        let share = (0.5 * (begin.share + end.share)).clamp(self.shares[0], self.shares[1]);
+        let of_piece = (share - begin.share) / (end.share - begin.share);
+        let divides = of_piece > SMALLEST_PIECE && of_piece < 1.0 - SMALLEST_PIECE;
+        let halves = if deviation <= self.aim_mm || depth == 0 || !divides {
             None
         } else {
-            end_between(from, to, 0.5, condition_index, self.arms)
+            end_between(from, to, of_piece, condition_index, self.arms)
         };
         match halves {
             None => out.remaining_mm = out.remaining_mm.max(deviation),
             Some(at) => {
-                let middle = InsertedTarget { share: 0.5 * (begin.share + end.share), at };
+                let middle = InsertedTarget { share, at };
                 self.split(begin, &middle, depth - 1, out);
                 out.inserted.push(middle);
                 self.split(&middle, end, depth - 1, out);

@@ -11,6 +11,7 @@ use crate::segment::curve::{CLOSED_MM, Curve};
 use crate::segment::line::{
     Segment, SegmentEnd, distance, insertions, joint_motion_deviation, line_deviation,
 };
+use crate::segment::rounded_end::RoundedEnd;
 use crate::target::solved_target::SolvedTarget;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, MotionKind, Switch};
@@ -32,12 +33,13 @@ pub(crate) struct SegmentPlan {
 
 impl SegmentPlan {
     /// For a motion whose targets are all corrected. `via`: its circle point. `middle_mm`: deviation of its commanded line at the
-    /// midpoint.
+    /// midpoint. `corners`: how the path is rounded at its ends.
     pub(crate) fn of(
         motion: &Motion,
         path: Option<&Segment<'_>>,
         via: Option<&SolvedTarget<'_>>,
         middle_mm: f64,
+        corners: &dyn Fn() -> [RoundedEnd; 2],
         arms: &Arms<'_>,
         options: &Options,
     ) -> SegmentPlan {
@@ -49,7 +51,7 @@ impl SegmentPlan {
             };
         };
         match (motion.kind, via) {
-            (MotionKind::Linear, _) => line(motion, path, middle_mm, arms, options),
+            (MotionKind::Linear, _) => line(motion, path, middle_mm, corners, arms, options),
             (MotionKind::Joint, _) => SegmentPlan {
                 path_deviation_mm: Some(joint_motion_deviation(path, arms)),
                 ..SegmentPlan::default()
@@ -84,6 +86,7 @@ fn line(
     motion: &Motion,
     path: &Segment<'_>,
     middle_mm: f64,
+    corners: &dyn Fn() -> [RoundedEnd; 2],
     arms: &Arms<'_>,
     options: &Options,
 ) -> SegmentPlan {
@@ -101,9 +104,10 @@ fn line(
     // program never stated.
     if motion.insertable
         && motion.modal.wrist_interpolation != Switch::On
-        && let Some(cut) = insertions(path, arms, options)
+        && let Some(found) = insertions(path, &corners(), arms, options)
+        && found.worst_mm() < deviation
     {
-        (out.before, left) = cut;
+        (out.before, left) = (found.before, found.remaining_mm);
         out.path_deviation_mm = Some(left);
     }
     out.flag = (!(left <= options.tolerance_mm)).then_some(OutcomeReason::PathDeviation { mm: left });

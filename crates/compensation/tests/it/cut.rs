@@ -71,15 +71,15 @@ fn a_target_that_cannot_be_reached_keeps_its_cut_and_no_other() {
     ]
     .concat();
     let (done, bytes) = done(&module(&body), Cuts::Whole, 0.05);
-    assert_eq!(statuses(&done), [Refused, Refused, Refused, Refused, Changed, Changed, Changed]);
+    // The line from the end of the cut stays with it.
+    assert_eq!(statuses(&done), [Refused, Refused, Refused, Refused, Refused, Changed, Changed]);
     let because = |index: usize| done.plan.outcomes[index].reason().unwrap().to_string();
     assert!(because(0).contains("line 6 is not corrected: target is out of reach"), "{}", because(0));
     assert!(because(2).contains("reach"), "{}", because(2));
     let text = String::from_utf8(bytes).unwrap();
-    for x in ["380", "390", "900", "400"] {
+    for x in ["380", "390", "900", "400", "410"] {
         assert!(text.contains(&target(x.parse().unwrap(), 0.0)), "{x}: {text}");
     }
-    assert!(!text.contains(&line(410.0, "z1")));
     // An unmodified motion keeps its deviation, and the report says so.
     assert_eq!(done.plan.outcomes[1].after_mm, done.plan.outcomes[1].before_mm);
 }
@@ -134,25 +134,28 @@ fn a_cut_extends_into_a_called_routine_and_out_of_it() {
     let [stop, last] = [line(385.0, "fine"), late.replace("z1", "fine")];
     let apart = with_routine(&stop, &last, &line(395.0, "fine"));
     let (apart, _) = self::done(&apart, Cuts::Whole, 0.05);
-    // The start of what is left stays with it; the step behind it is counted.
-    assert_eq!(statuses(&apart), [Refused, Changed, Left]);
-    assert_eq!(apart.plan.steps.unwrap().motions, [1]);
+    // The start of what is left stays with it, and so does the line behind it.
+    assert_eq!(statuses(&apart), [Refused, Refused, Left]);
+    assert_eq!(apart.plan.steps, None);
     // Corrected on both sides: nothing is refused, and nothing steps.
     let (whole, _) = self::done(&with_routine(&a, &b, &d), Cuts::Whole, 0.05);
     assert_eq!((statuses(&whole), whole.plan.steps), (vec![Changed; 3], None));
 }
 
-/// With a stop at every target each line is a cut of its own: what leads to the one that is left stays with it, and what is corrected behind
-/// it stands beside it.
+/// With a stop at every target each line is a cut of its own: what leads to the one that is left stays with it, and what follows it too. A
+/// line from an approach that is left is corrected, and stands beside it.
 #[test]
 fn steps_beside_what_is_left_are_counted() {
     let late = "MoveL Offs(seen,0,0,0),v20,fine,tool0;\n".to_owned();
-    let body =
-        [line(380.0, "fine"), line(385.0, "fine"), late, line(390.0, "fine"), line(395.0, "fine")].concat();
+    let rest = [line(390.0, "fine"), line(395.0, "fine")].concat();
+    let body = [line(380.0, "fine"), line(385.0, "fine"), late.clone(), rest.clone()].concat();
     let (done, _) = done(&module(&body), Cuts::Whole, 0.05);
-    assert_eq!(statuses(&done), [Refused, Refused, Left, Changed, Changed]);
+    assert_eq!(statuses(&done), [Refused, Refused, Left, Refused, Refused]);
+    assert_eq!(done.plan.steps, None);
+    let (done, _) = self::done(&module(&(late + &rest)), Cuts::Whole, 0.05);
+    assert_eq!(statuses(&done), [Left, Changed, Changed]);
     let steps = done.plan.steps.unwrap();
-    assert_eq!(steps.motions, [3]);
+    assert_eq!(steps.motions, [1]);
     assert!(steps.largest_mm.is_some_and(|mm| mm > 0.05 && mm < 10.0), "{steps:?}");
     // What an instruction of a module that is not given does there is unknown.
     let elsewhere = "grind [[387,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n".to_owned();
@@ -224,16 +227,16 @@ fn the_start_of_a_cut_that_is_left_stays_whatever_leads_to_it() {
     let left = at(380.0, 400.0, "z1") + late;
     let away = at(390.0, 450.0, "fine");
     let found = |body: &[&str]| statuses(&done(&module(&body.concat()), Cuts::Whole, 0.05).0);
-    // The line that draws the tool back from the first cut may be tilted; what it leads to is kept.
+    // The line that draws the tool back from the first cut may be tilted; what it leads to is kept, and so is what leads away.
     assert_eq!(
         found(&[&air, &first, &over, &left, &away]),
-        [Changed, Changed, Changed, Changed, Refused, Refused, Refused, Refused, Left, Changed]
+        [Changed, Changed, Changed, Changed, Refused, Refused, Refused, Refused, Left, Refused]
     );
     // Without such a line the tool may cut all the way: nothing is corrected.
     let along = at(375.0, 400.0, "fine");
     assert_eq!(found(&[&air, &first, &along, &left, &away])[..6], [Refused; 6]);
-    // A single line from the end of a cut to an air move takes the tool away.
-    assert_eq!(found(&[&air, &first, late, &air]), [Changed, Changed, Changed, Changed, Left, Changed]);
+    // A single line from the end of a cut to an air move takes the tool away; where to is not known, so the air move stays too.
+    assert_eq!(found(&[&air, &first, late, &air]), [Changed, Changed, Changed, Changed, Left, Refused]);
     // Behind a label, and in a routine with an error handler that repeats it.
     let again = ["n:=0;\nagain:\nn:=n+1;\n", &left, "IF n<3 GOTO again;\n"].concat();
     let looped =
@@ -303,15 +306,67 @@ fn a_line_from_an_uncorrected_corner_of_a_contour_stays_too() {
     let late = "MoveL Offs(seen,0,0,0),v20,fine,tool0;\n";
     let away = at(360.0, 0.0, 450.0);
     let found = |body: &[&str]| statuses(&done(&module(&body.concat()), Cuts::Whole, 0.05).0);
-    // The line that draws the tool back begins at an uncorrected place in the air.
+    // The line that draws the tool back would go sideways.
     let contour = found(&[&air, &a, &b, &c, late, &a, &away, &air]);
-    assert_eq!(contour, [Refused, Refused, Refused, Refused, Left, Refused, Changed, Changed]);
+    assert_eq!(contour, [Refused, Refused, Refused, Refused, Left, Refused, Refused, Changed]);
     // A process may be switched at a stop, but whether off or on is not known.
     let switched = found(&[&air, &a, &b, &c, late, "SetDO do1,0;\n", &a, &away, &air]);
     assert_eq!(switched, contour);
     // An uncorrected approach through the air is none of a contour.
     let approached = found(&[&air, late, &a, &b, &c, &a, &away]);
     assert_eq!(approached[2..], [Changed; 5]);
+}
+
+/// The way out of a cut that is left was corrected: the tool was drawn out of the part sideways.
+#[test]
+fn the_way_out_of_a_cut_that_is_left_stays_too() {
+    let at = |x: f64, z: f64, zone: &str| {
+        format!("MoveL [[{x},0,{z}],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,{zone},tool0;\n")
+    };
+    let joint = |x: f64, z: f64| at(x, z, "z10").replace("MoveL", "MoveJ");
+    let cut = |x: f64| [at(x, 400.0, "z1"), at(x + 10.0, 400.0, "fine")].concat();
+    let late = "MoveL Offs(seen,0,0,0),v20,z1,tool0;\n";
+    let left = [&at(350.0, 400.0, "z1"), late, &at(370.0, 400.0, "fine")].concat();
+    let found = |body: &[&str]| done(&module(&body.concat()), Cuts::Whole, 0.05).0;
+    for out in [at(370.0, 450.0, "z10"), joint(370.0, 450.0)] {
+        let done = found(&[&joint(350.0, 450.0), &left, &out, &joint(380.0, 450.0), &cut(380.0)]);
+        assert_eq!(
+            statuses(&done),
+            [Refused, Refused, Left, Refused, Refused, Changed, Changed, Changed],
+            "{out}"
+        );
+        let why = done.plan.outcomes[4].reason();
+        assert_eq!(why, Some(OutcomeReason::DepartureFromUnchangedCut { line: 7 }), "{out}");
+        // Where it leads to the start of a corrected cut, that comes first.
+        let plunge = cut(370.0);
+        let done = found(&[&joint(350.0, 450.0), &left, &out, &plunge]);
+        assert_eq!(statuses(&done)[3..], [Refused, Changed, Changed, Changed], "{out}");
+    }
+    // From a corrected cut all is corrected.
+    let done = found(&[&joint(350.0, 450.0), &cut(350.0), &at(360.0, 450.0, "z10"), &joint(380.0, 450.0)]);
+    assert_eq!(statuses(&done), [Changed; 5]);
+}
+
+/// After the last cut of an NC program, and between two.
+#[test]
+fn the_way_out_of_a_cut_of_an_nc_program_stays_too() {
+    let head = "; truegrind angles wpr\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[400,0,250],[1,0,0,0]]\n\
+                N1 G90 G71 G17 G54\nN2 T1 D1 M6\nN3 TRAORI\n";
+    let at = |code: &str, x: f64, z: f64| format!("{code} X{x:.1} Y0 Z{z} A180 B0 C0 F600\n");
+    let left = [&at("G0", -10.0, 40.0), &at("G1", -10.0, 20.0), "X0 RND=2\n", &at("G1", 5.0, 20.0)].concat();
+    let found = |body: &[&str]| {
+        let source = [head, &body.concat(), "M30\n"].concat();
+        let setup = Setup { angles: Some(Angles::Wpr), ..Setup::default() };
+        let program = Program::Nc(nc::Task::read(&[("p.mpf", source.as_bytes())], &setup));
+        compensate(&program, &known(), &Cell::default(), &Options::default(), None).unwrap()
+    };
+    let done = found(&[&left, "G0 Z40\n"]);
+    assert!(!done.changed(), "{:?}", statuses(&done));
+    let next = [at("G0", 20.0, 40.0), at("G1", 20.0, 20.0), at("G1", 30.0, 20.0)].concat();
+    // What leads to the next cut is corrected, but not the way out.
+    let done = found(&[&left, "G0 Z40\n", &next]);
+    assert_eq!(statuses(&done), [Refused, Refused, Left, Refused, Refused, Changed, Changed, Changed]);
+    assert_eq!(done.plan.outcomes[4].reason(), Some(OutcomeReason::DepartureFromUnchangedCut { line: 10 }));
 }
 
 /// A line that is written as joints, and of which no deviation is known, counted as one without a step.
@@ -375,13 +430,14 @@ fn lines_from_joint_targets_that_are_left_are_counted() {
 #[test]
 fn another_tool_or_work_object_begins_another_cut() {
     let other = "MoveL [[385,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,long;\n";
-    let body = [line(900.0, "z1"), other.to_owned()].concat();
+    let air = line(380.0, "z10").replace("MoveL", "MoveJ");
+    let body = [line(900.0, "z1"), air, other.to_owned()].concat();
     let source = module(&body).replace(
         "VAR robtarget",
         "PERS tooldata long:=[TRUE,[[0,0,60],[1,0,0,0]],[1,[0,0,10],[1,0,0,0],0,0,0]];\nVAR robtarget",
     );
     let (done, _) = done(&source, Cuts::Whole, 0.05);
-    assert_eq!(statuses(&done), [Refused, Changed]);
+    assert_eq!(statuses(&done), [Refused, Changed, Changed]);
 }
 
 #[test]
@@ -399,8 +455,8 @@ fn what_the_writer_refuses_keeps_its_cut_too() {
     // The line behind it would start where the uncorrected one ends.
     assert_eq!(statuses(&plan(Cuts::Single)), [Changed, Changed, Refused, Refused, Changed]);
     let whole = plan(Cuts::Whole);
-    // And the way to its start stays with it.
-    assert_eq!(statuses(&whole), [Refused, Refused, Refused, Refused, Changed]);
+    // And the ways to its start and from its end stay with it.
+    assert_eq!(statuses(&whole), [Refused; 5]);
     let reasons: Vec<_> = whole.plan.outcomes.iter().map(|outcome| outcome.reason()).collect();
     assert!(matches!(reasons[1], Some(OutcomeReason::PartOfCut { line: 6, .. })), "{reasons:?}");
     assert_eq!(reasons[3], Some(OutcomeReason::LineWithoutStart));

@@ -59,6 +59,7 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::StartOfUnchangedArc { .. } => "before circle",
         // tests/it/cut.rs.
         OutcomeReason::StartOfUnchangedCut { .. } => "before a cut",
+        OutcomeReason::DepartureFromUnchangedCut { .. } => "behind a cut",
         // tests/it/singularity.rs.
         OutcomeReason::StartOfSingularPath { .. } => "before singular way",
         OutcomeReason::FullCircle => "whole circle",

@@ -194,10 +194,11 @@ fn a_cut_that_stays_names_the_line_that_caused_it() {
 #[test]
 fn motions_that_are_kept_for_the_sake_of_others_share_a_group_whatever_the_line() {
     let (mut plan, listing, files) = example();
-    let for_other: [fn(u32) -> OutcomeReason; 5] = [
+    let for_other: [fn(u32) -> OutcomeReason; 6] = [
         |line| OutcomeReason::HalfTurn { line },
         |line| OutcomeReason::StartOfUnchangedArc { line },
         |line| OutcomeReason::StartOfUnchangedCut { line },
+        |line| OutcomeReason::DepartureFromUnchangedCut { line },
         |line| OutcomeReason::StartOfSingularPath { line },
         |line| OutcomeReason::StartOfLimitedPath { line, what: Limited::joint(2) },
     ];
@@ -208,7 +209,7 @@ fn motions_that_are_kept_for_the_sake_of_others_share_a_group_whatever_the_line(
         assert_eq!(table.rows.len(), 1, "{index}");
         let text = csv::table(&table);
         assert!(text.contains("lines 20, 21, 22, 23 and 3 more)"), "{text}");
-        assert_eq!(text.contains("joint 3, lines"), index == 4, "{text}");
+        assert_eq!(text.contains("joint 3, lines"), index == 5, "{text}");
     }
 }
 
@@ -362,6 +363,47 @@ fn a_work_object_without_a_corrected_motion_is_not_called_corrected() {
         text.contains("wobj0: no motion with it is corrected; the path as a whole is displaced by 2.131 mm"),
         "{text}"
     );
+}
+
+/// Two passes over one contour of which one was left came apart by the correction without a word.
+#[test]
+fn cuts_that_stay_behind_are_named() {
+    let (mut plan, listing, _) = example();
+    let cut = |motion: u32, corrected: bool| CutRisk {
+        motions: vec![motion],
+        assessed: Placement::Absolute,
+        deviation_mm: 1.121,
+        sigma_mm: 0.1,
+        shape_sigma_mm: 0.01,
+        probability_of_harm: 0.0,
+        left_for_risk: false,
+        corrected,
+    };
+    plan.placements = vec![ObjectPlacement {
+        work_object: "wobj0".to_owned(),
+        applied: Placement::Absolute,
+        deviation_mm: 1.1,
+        sigma_mm: 0.1,
+        probability_of_harm: 0.0,
+        taught: false,
+        unlocated: false,
+        others: Vec::new(),
+        held: false,
+        remedy: None,
+    }];
+    let said = |plan: &Plan| sentences(plan, &listing).join("\n");
+    plan.cuts = vec![cut(0, true), cut(2, false)];
+    let text = said(&plan);
+    assert!(text.contains("wobj0: the cut that begins at line "), "{text}");
+    assert!(text.contains("passes over one contour then lie up to 1.121 mm apart"), "{text}");
+    for corrected in [true, false] {
+        plan.cuts = vec![cut(0, corrected), cut(2, corrected)];
+        assert!(!said(&plan).contains("apart"), "{corrected}");
+    }
+    // Where the shape alone is corrected, they do not move against each other.
+    plan.cuts = vec![cut(0, true), cut(2, false)];
+    plan.placements[0].applied = Placement::Shape;
+    assert!(!said(&plan).contains("passes over one contour"));
 }
 
 /// Work objects on one fixture are named together, and what is decided differently over objects that stand is said to move apart.
