@@ -45,7 +45,7 @@ impl PyIdentification {
     /// Reasons for the verdict, one sentence each.
     #[getter]
     fn reasons(&self) -> Vec<String> {
-        self.found.estimated.verdict.reasons.clone()
+        self.found.estimated.verdict.sentences().into_iter().map(str::to_owned).collect()
     }
 
     /// RMS error on held-out rows (mm).
@@ -253,7 +253,7 @@ impl PyDiagnosis {
     /// Reasons for the verdict, one sentence each.
     #[getter]
     fn reasons(&self) -> Vec<String> {
-        self.found.estimated.verdict.reasons.clone()
+        self.found.estimated.verdict.sentences().into_iter().map(str::to_owned).collect()
     }
 
     /// The causes, largest first: dictionaries as in the JSON.

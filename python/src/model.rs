@@ -68,7 +68,7 @@ impl PyModel {
         robots::check_catalogue_name(&arm.robot, &arm.nominal)
             .map_err(|error| Refusal::new(Kind::Model, format!("{name}: {error}")).of_file(name))?;
         if arm.verdict.status == Judgement::Fail {
-            let why = arm.verdict.reasons.join("; ");
+            let why = arm.verdict.sentences().join("; ");
             let message = format!("{name}: this model cannot be used, since its fit failed: {why}");
             return Err(Refusal::new(Kind::Model, message).of_file(name));
         }
@@ -87,7 +87,7 @@ impl PyModel {
     /// Refuses a doubtful model unless allowed.
     pub(crate) fn allowed(&self, allow_doubtful: bool) -> Result<(), Refusal> {
         let verdict = &self.arm.verdict;
-        let why = || verdict.reasons.join("; ");
+        let why = || verdict.sentences().join("; ");
         match verdict.status {
             Judgement::Fail => {
                 let message =
@@ -171,7 +171,7 @@ impl PyModel {
     /// Reasons for the verdict, one sentence each.
     #[getter]
     fn reasons(&self) -> Vec<String> {
-        self.arm.verdict.reasons.clone()
+        self.arm.verdict.sentences().into_iter().map(str::to_owned).collect()
     }
 
     /// First twelve hex digits of the SHA-256 of the model file; written into corrected programs.

@@ -122,7 +122,7 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     if arm.verdict.status == Judgement::Fail {
         bail!(
             "{argument}: this model cannot be used, since its fit failed: {}",
-            arm.verdict.reasons.join("; ")
+            arm.verdict.sentences().join("; ")
         );
     }
     let hash = hash(text.as_bytes());
@@ -161,7 +161,7 @@ pub(super) fn refuse_doubtful(model: &NamedModel, allowed: bool) -> anyhow::Resu
     if arm.verdict.status == Judgement::Doubtful && !allowed {
         bail!(
             "{name}: this model is doubtful, so programs are corrected with it only with --allow-doubtful: {}",
-            arm.verdict.reasons.join("; ")
+            arm.verdict.sentences().join("; ")
         );
     }
     warn_doubtful(model);
@@ -174,7 +174,7 @@ pub(super) fn warn_doubtful(model: &NamedModel) {
     if arm.verdict.status == Judgement::Doubtful {
         print_message(format_args!(
             "note: {name}: this model is doubtful: {}",
-            arm.verdict.reasons.join("; ")
+            arm.verdict.sentences().join("; ")
         ));
     }
 }

@@ -12,14 +12,12 @@ use self::tables::row_number;
 use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
 use super::number::Precision;
 use super::status::Status;
-use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
+use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, ReasonKind};
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::identification::benefit::Benefit;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::identification::verdict::{
-    CONVERGED, NO_LIMITS, NOT_NOISE, TARGET_NOT_SHOWN, percent_of,
-};
+use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_calibration::measurement::dataset::Dataset;
 
 pub use tables::{
@@ -258,23 +256,23 @@ pub fn judged(estimated: &Estimated) -> Verdict {
     let mut reasons = estimated.verdict.reasons.clone();
     if matches!(estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated) {
         // The headline says what limits were stated, and an arm that may be used has converged.
-        reasons.retain(|reason| !reason.ends_with(CONVERGED) && reason != NO_LIMITS);
+        reasons.retain(|reason| !matches!(reason.kind, ReasonKind::Converged | ReasonKind::NoLimits));
         reasons.push(
             "what to do: correct programs with it (`truegrind compensate`), inside the measured region"
-                .to_owned(),
+                .into(),
         );
     }
-    Verdict::new(status, headline, reasons)
+    Verdict::new(status, headline, reasons.into_iter().map(|reason| reason.text))
 }
 
 /// Whether its verdict notes that repeated poses show more than noise.
 fn shows_more_than_noise(estimated: &Estimated) -> bool {
-    estimated.verdict.reasons.iter().any(|reason| reason.starts_with(NOT_NOISE))
+    estimated.verdict.has(ReasonKind::MoreThanNoise)
 }
 
 /// Whether its verdict notes that the poses do not show where the target sits.
 fn shows_no_target(estimated: &Estimated) -> bool {
-    estimated.verdict.reasons.iter().any(|reason| reason.contains(TARGET_NOT_SHOWN))
+    estimated.verdict.has(ReasonKind::TargetNotShown)
 }
 
 /// Expected deviation of programs before and after correction.

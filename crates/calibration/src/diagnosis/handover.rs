@@ -23,12 +23,14 @@ use crate::identification::inflation::inflation_from_errors;
 use crate::identification::linearised_readings::widen_by_scale;
 use crate::identification::parameter_table::parameter_table;
 use crate::identification::unseen_target::unseen_target;
-use crate::identification::verdict::{CONVERGED, VerdictBuilder};
+use crate::identification::verdict::VerdictBuilder;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::NoiseFloor;
 use crate::measurement::split;
 use nalgebra::DMatrix;
-use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
+use truegrind_arm::estimated::{
+    Estimated, EstimatedParameter, Judgement, Provenance, Reason, ReasonKind, StageErrors, Verdict,
+};
 use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::problem::Problem;
@@ -134,7 +136,7 @@ impl Handover<'_> {
         }
         notes.push(format!(
             "the written arm is geometry alone, as `identify` fits it, since the arm with causes was refused: {}",
-            verdict.reasons.first().map_or("it is implausible", String::as_str)
+            verdict.reasons.first().map_or("it is implausible", |reason| reason.text.as_str())
         ));
         alone
     }
@@ -381,7 +383,7 @@ struct Judged<'a> {
     benefit: Result<&'a Benefit, &'a NoBenefit>,
     sensor: Sensor,
     /// That the poses do not show the target's place on the flange.
-    unseen_target: Option<String>,
+    unseen_target: Option<Reason>,
     /// Errors of the data sheet, of geometry, and of the fit.
     stages: [StageError; 3],
     /// How many rows were set aside, of how many.
@@ -399,7 +401,7 @@ fn judge(case: &Judged<'_>) -> Verdict {
     let mut verdict = VerdictBuilder::default();
     let stages = &case.stages;
     if case.fitted.termination().is_converged() {
-        verdict.note(CONVERGED);
+        verdict.note(Reason::new(ReasonKind::Converged, "the fit converged"));
     } else {
         verdict.fail(format!("the fit did not converge: {}", case.fitted.termination()));
     }
@@ -420,7 +422,7 @@ fn judge(case: &Judged<'_>) -> Verdict {
     verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
     verdict.check_benefit(case.benefit, case.sensor);
     if let Some(unseen_target) = &case.unseen_target {
-        verdict.note(unseen_target.as_str());
+        verdict.note(unseen_target.clone());
     }
     verdict.check_limits(&case.options.limits, &stages[2].random);
     verdict.build()

@@ -254,7 +254,7 @@ impl Diagnosed {
             if verdict.status != Judgement::Fail {
                 verdict.status = if surely { Judgement::Fail } else { Judgement::Doubtful };
             }
-            verdict.reasons.insert(0, format!("{compared}: `identify` writes geometry alone"));
+            verdict.reasons.insert(0, format!("{compared}: `identify` writes geometry alone").into());
         } else if let Some(foreign) = foreign {
             let status = if foreign.fails() { Judgement::Fail } else { Judgement::Doubtful };
             if verdict.status != Judgement::Fail {
@@ -268,10 +268,11 @@ impl Diagnosed {
                      while the held-out error here is {held_out_mm:.3} mm: {}",
                     tested.file,
                     foreign.says()
-                ),
+                )
+                .into(),
             );
         } else {
-            verdict.reasons.push(compared);
+            verdict.reasons.push(compared.into());
         }
         self.diagnosis.verdict = Some(verdict.clone());
         self.diagnosis.transfers.push(tested);

@@ -28,14 +28,15 @@ use crate::identification::solver::{Family, SOLVERS, Solver};
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::identification::unseen_target::unseen_target;
-use crate::identification::verdict::{CONVERGED, Limits, NOT_NOISE, VerdictBuilder};
+use crate::identification::verdict::{Limits, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::{self, NoiseFloor};
 use crate::measurement::split::Split;
 use crate::measurement::stations::without_frames;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{
-    Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict, WidthUncertainty,
+    Estimated, EstimatedParameter, Judgement, Provenance, Reason, ReasonKind, StageErrors, Verdict,
+    WidthUncertainty,
 };
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{Parameter, arm_parameters, link_parameters};
@@ -612,7 +613,7 @@ struct VerdictInputs<'a> {
     /// What speaks against one frame for all sessions.
     set_up_anew: Option<String>,
     /// That the poses do not show the target's place on the flange.
-    unseen_target: Option<String>,
+    unseen_target: Option<Reason>,
     /// What repeated poses show beside the noise of a reading.
     repeats: Option<&'a str>,
     /// What errors beyond the noise make of a tool that is longer than the target is far from the flange.
@@ -645,7 +646,7 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
         let filtered =
             options.solver.family == Family::Filter && fitted.termination() == Termination::DataProcessed;
         if fitted.termination().is_converged() {
-            verdict.note(format!("on {rows} {CONVERGED}"));
+            verdict.note(Reason::new(ReasonKind::Converged, format!("on {rows} the fit converged")));
         } else if filtered {
             verdict.note(format!(
                 "on {rows} the filter processed every reading; it does not test for a minimum"
@@ -674,13 +675,14 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
         ));
     }
     if let Some(unseen_target) = &case.unseen_target {
-        verdict.note(unseen_target.as_str());
+        verdict.note(unseen_target.clone());
     }
     if let Some(pattern) = case.repeats {
-        verdict.note(format!(
-            "{NOT_NOISE}: {pattern}. The expected error does not treat this as sensor noise; `diagnose` looks for the cause and fits a model \
+        let text = format!(
+            "repeated poses differ by more than the noise of a reading: {pattern}. The expected error does not treat this as sensor noise; `diagnose` looks for the cause and fits a model \
              without it"
-        ));
+        );
+        verdict.note(Reason::new(ReasonKind::MoreThanNoise, text));
     }
     if let Some(longer_tool) = &case.longer_tool {
         verdict.note(longer_tool.as_str());

@@ -17,7 +17,7 @@ mod clock;
 mod column_names;
 mod columns;
 mod error;
-pub(crate) mod join_by_time;
+mod join_by_time;
 mod options;
 mod tracker_export;
 mod foreign;
@@ -115,9 +115,10 @@ pub fn read_joined_by_time(
     clocks: &TimeMatching,
     options: &Options,
 ) -> Result<Dataset, ImportError> {
-    read_together(log, points, options, |measured, table| {
+    let joined = read_together(log, points, options, |measured, table| {
         join_by_time::join_by_time(&measured, log.0, table, clocks)
-    })
+    })?;
+    Ok(Dataset { joined_by_time: true, ..joined })
 }
 
 fn read_together(

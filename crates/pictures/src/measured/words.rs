@@ -115,7 +115,7 @@ fn verdict(text: &mut String, found: &Identification) {
     let method = line(&found.estimated.provenance.method);
     let _ = writeln!(text, "Method: **{method}**. Verdict: **{status}**.\n");
     for reason in &verdict.reasons {
-        let _ = writeln!(text, "- {}", line(reason));
+        let _ = writeln!(text, "- {}", line(&reason.text));
     }
     text.push('\n');
 }

@@ -1,6 +1,6 @@
 //! Tables, sentences, JSON and page of an identification.
 
-use truegrind_arm::estimated::{EstimatedParameter, Judgement, StageErrors};
+use truegrind_arm::estimated::{EstimatedParameter, Judgement, Reason, ReasonKind, StageErrors};
 use truegrind_arm::link::LinkModel;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_arm::sensor::Sensor;
@@ -10,7 +10,6 @@ use truegrind_calibration::identification::fit::Outlier;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
-use truegrind_calibration::identification::verdict::{NOT_NOISE, TARGET_NOT_SHOWN};
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_report::format::{csv, markdown, terminal};
 use truegrind_report::identification as view;
@@ -73,7 +72,7 @@ fn repeated_poses_that_show_more_than_noise_head_a_warning() {
     for status in [Judgement::NotEvaluated, Judgement::Pass] {
         found.estimated.verdict.status = status;
         found.estimated.verdict.reasons =
-            vec![format!("{NOT_NOISE}: they differ by 0.350 mm in one direction")];
+            vec![Reason::new(ReasonKind::MoreThanNoise, "they differ by 0.350 mm in one direction")];
         let text = terminal::document(&view::summary(&found), 300);
         assert!(text.contains("[warning] The model may be used"), "{text}");
         assert!(text.contains("by 0.350 mm in one direction"), "{text}");
@@ -87,7 +86,7 @@ fn repeated_poses_that_show_more_than_noise_head_a_warning() {
 fn a_target_that_the_poses_do_not_show_is_in_the_headline() {
     let mut found = by_hand();
     found.estimated.verdict.status = Judgement::NotEvaluated;
-    found.estimated.verdict.reasons = vec![format!("these poses, of one kind, {TARGET_NOT_SHOWN}: ...")];
+    found.estimated.verdict.reasons = vec![Reason::new(ReasonKind::TargetNotShown, "...")];
     let text = terminal::document(&view::summary(&found), 400);
     assert!(text.contains("frames alone; errors are those of the target"), "{text}");
 }
@@ -230,7 +229,7 @@ fn what_makes_up_for_an_unseen_link_is_named() {
 fn a_verdict_is_one_sentence_with_its_reasons() {
     let mut found = by_hand();
     let head = |found: &Identification| terminal::document(&view::summary(found), 300);
-    found.estimated.verdict.reasons = vec!["because".to_owned()];
+    found.estimated.verdict.reasons = vec!["because".into()];
     for (status, badge, sentence) in [
         (Judgement::Pass, "[ok]", "The model may be used; it meets the stated limits"),
         (Judgement::Fail, "[failed]", "The model must not be used"),

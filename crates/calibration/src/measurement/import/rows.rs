@@ -108,6 +108,7 @@ pub(super) fn dataset(
         rows: rows.into(),
         other_columns: columns.other.iter().map(|(name, _)| name.clone()).collect(),
         notes,
+        joined_by_time: false,
         station_names: stations.names(),
         angle_step_rad,
         readout_step_mm,
