@@ -51,13 +51,13 @@ impl PyIdentification {
     /// RMS error on held-out rows (mm).
     #[getter]
     fn held_out_rmse_mm(&self) -> f64 {
-        self.found.estimated.geometry.held_out.rmse
+        self.found.estimated.calibrated.held_out.rmse
     }
 
     /// Largest error on held-out rows (mm).
     #[getter]
     fn held_out_max_mm(&self) -> f64 {
-        self.found.estimated.geometry.held_out.max
+        self.found.estimated.calibrated.held_out.max
     }
 
     /// RMS error on held-out rows of the nominal arm with a fitted sensor frame (mm).

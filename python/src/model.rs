@@ -183,7 +183,7 @@ impl PyModel {
     /// RMS error on held-out rows (mm).
     #[getter]
     fn held_out_rmse_mm(&self) -> f64 {
-        self.arm.geometry.held_out.rmse
+        self.arm.calibrated.held_out.rmse
     }
 
     /// RMS error on held-out rows of the nominal arm with a fitted sensor frame (mm).
@@ -294,7 +294,7 @@ impl PyModel {
         format!(
             "<Model of {}: held-out RMSE {:.4} mm, verdict {}>",
             self.arm.robot,
-            self.arm.geometry.held_out.rmse,
+            self.arm.calibrated.held_out.rmse,
             word(self.arm.verdict.status)
         )
     }

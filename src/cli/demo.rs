@@ -110,7 +110,7 @@ impl Job<'_> {
             condition: self.condition,
         };
         let mut report = verify(&judged, &acting);
-        report.held_out_mm = Some(estimated.geometry.held_out.rmse);
+        report.held_out_mm = Some(estimated.calibrated.held_out.rmse);
         for (point, planned) in report.points.iter_mut().zip(&planned.points) {
             (point.sigma_mm, point.outside) = (planned.sigma_mm, planned.outside);
             (point.status, point.reason) = (planned.status, planned.reason.clone());

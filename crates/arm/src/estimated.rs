@@ -119,8 +119,8 @@ pub struct Estimated {
     pub provenance: Provenance,
     /// Errors of the nominal arm with registered frames.
     pub registered: StageErrors,
-    /// Errors of the calibrated arm.
-    pub geometry: StageErrors,
+    /// Errors of the calibrated arm: with geometry, and after a diagnosis with its causes.
+    pub calibrated: StageErrors,
     /// Noise floor from sensor and rounding (mm); absent where it is unknown.
     pub noise_floor_mm: Option<f64>,
     /// RMS error of a position that the model leaves beyond the noise (mm); absent where the noise is unknown.

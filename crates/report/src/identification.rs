@@ -145,7 +145,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
         "stages": {
             "raw": found.raw.map(|all| json!({ "all": all })),
             "registered": estimated.registered,
-            "geometry": estimated.geometry,
+            "geometry": estimated.calibrated,
         },
         "parameters": parameters(true),
         "frames": parameters(false),
@@ -216,7 +216,7 @@ fn verdict(found: &Identification) -> Verdict {
 
 /// The verdict on an estimated arm, the same for identification and diagnosis.
 pub fn judged(estimated: &Estimated) -> Verdict {
-    let (before, after) = (estimated.registered.held_out.rmse, estimated.geometry.held_out.rmse);
+    let (before, after) = (estimated.registered.held_out.rmse, estimated.calibrated.held_out.rmse);
     // A diagnosis has a second held-out error beside it: that of the fit with all causes.
     let of = if estimated.provenance.method == "diagnose" { " of the written arm" } else { "" };
     let place = if shows_no_target(estimated) {
@@ -313,7 +313,7 @@ fn too_few_repeats(found: &Identification) -> String {
 
 fn key_figures(found: &Identification) -> Vec<KeyFigure> {
     let estimated = &found.estimated;
-    let (before, after) = (&estimated.registered.held_out, &estimated.geometry.held_out);
+    let (before, after) = (&estimated.registered.held_out, &estimated.calibrated.held_out);
     let gain = if before.rmse > 0.0 { 100.0 * (1.0 - after.rmse / before.rmse) } else { f64::NAN };
     let floor = KeyFigure::new("Noise floor", estimated.noise_floor_mm, 3, "mm");
     let used = estimated.provenance.rows;

@@ -10,7 +10,7 @@ use super::options::Options;
 use super::search::{Search, SearchContext};
 use super::selection::contains_cause;
 use super::sensor_causes::{self, probability_worse};
-use super::validation::StageError;
+use super::validation::{ErrorsByStage, StageError};
 use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
@@ -120,7 +120,7 @@ impl Handover<'_> {
         notes: &mut Vec<String>,
     ) -> HandedOver {
         let verdict = &with_causes.estimated.verdict;
-        if verdict.status != Judgement::Fail || self.search.extended.causes.is_empty() {
+        if verdict.status != Judgement::Fail || self.search.full_fit.causes.is_empty() {
             return with_causes;
         }
         let Some(plain) = self.as_identified(&written(self.search, &[], None)) else { return with_causes };
@@ -179,7 +179,7 @@ impl Handover<'_> {
             None => {
                 // A scatter about a joint remains with and without correction, as what all causes leave beyond the noise does.
                 let scatter_mm = self.scatter.as_ref().map_or(0.0, JointScatter::rms_mm);
-                let inflation = inflation_from_errors(fitted, rows, &estimated.geometry);
+                let inflation = inflation_from_errors(fitted, rows, &estimated.calibrated);
                 // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
                 benefit(fitted, rows, &estimated, &options.arm_tolerance, inflation)
                     .map(|benefit| benefit.with_unmodelled(beyond_noise.at_least_scatter(scatter_mm)))
@@ -191,7 +191,7 @@ impl Handover<'_> {
             benefit: benefit.as_ref(),
             sensor: rows.sensor,
             unseen_target: unseen_target(handed, &self.kept_rows(), &estimated),
-            stages: self.stages(arm.errors),
+            errors: self.errors(arm.errors),
             set_aside: (self.search.set_aside.len(), rows.rows.len()),
             options,
         });
@@ -220,7 +220,7 @@ impl Handover<'_> {
     fn missing_errors(&self, arm: &WrittenArm<'_>) -> Vec<MissingError> {
         let search = self.search;
         let mut missing =
-            in_doubt::missing_errors(&search.context.subject, &search.extended, arm.with_uncertain);
+            in_doubt::missing_errors(&search.context.subject, &search.full_fit, arm.with_uncertain);
         // What a fault of the joint without a file leaves is known better than its scatter.
         let scatter = self.scatter.as_ref().map(MissingError::scatter);
         missing
@@ -230,7 +230,7 @@ impl Handover<'_> {
 
     /// What an arm leaves beyond the noise.
     fn beyond_noise_of(&self, arm: &WrittenArm<'_>) -> BeyondNoise {
-        let [all, beside_sensor, own] = [&self.search.stages[2], &arm.beside_sensor, &arm.errors]
+        let [all, beside_sensor, own] = [&self.search.errors.with_causes, &arm.beside_sensor, &arm.errors]
             .map(|s| StageErrors { fitted: s.fitted, held_out: s.random });
         let sensor = self.search.context.dataset.sensor;
         let of_arm = self.beyond_noise.of_submodel(&all, &beside_sensor, sensor, true);
@@ -244,9 +244,8 @@ impl Handover<'_> {
     }
 
     /// Errors of the data sheet, of geometry, and of the written fit.
-    fn stages(&self, own: StageError) -> [StageError; 3] {
-        let [before, geometry, _] = self.search.stages;
-        [before, geometry, own]
+    fn errors(&self, own: StageError) -> ErrorsByStage {
+        ErrorsByStage { with_causes: own, ..self.search.errors }
     }
 
     fn without_verdict(
@@ -258,7 +257,7 @@ impl Handover<'_> {
     ) -> Estimated {
         let SearchContext { dataset, prepared, subject, options, .. } = self.search.context;
         let set_aside = &self.search.set_aside;
-        let stages = self.stages(errors);
+        let ErrorsByStage { registered, with_causes, .. } = self.errors(errors);
         Estimated {
             robot: self.robot.to_owned(),
             nominal: subject.nominal.clone(),
@@ -282,8 +281,8 @@ impl Handover<'_> {
                 .into_iter()
                 .filter(|p| p.is_of_arm())
                 .collect(),
-            registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
-            geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
+            registered: StageErrors { fitted: registered.fitted, held_out: registered.random },
+            calibrated: StageErrors { fitted: with_causes.fitted, held_out: with_causes.random },
             noise_floor_mm: self.noise_floor_mm,
             beyond_noise_mm: beyond_noise.known_mm(),
             beyond_noise_rad: None,
@@ -313,14 +312,14 @@ fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification
 /// The model with `causes` under the tolerances of the arm.
 fn written(search: &Search<'_>, causes: &[Cause], discrepancy: Option<&Discrepancy>) -> Extended {
     let SearchContext { subject, options, .. } = &search.context;
-    fit_written(subject, &options.arm_tolerance, &search.extended, causes, discrepancy)
+    fit_written(subject, &options.arm_tolerance, &search.full_fit, causes, discrepancy)
 }
 
 /// The arm for compensation, with its errors. Its effects are included only if they lower the held-out error of this very model, in
 /// random folds and in blocks; causes that are not part of it do not count.
 fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Discrepancy>) -> WrittenFit {
     let of = |certain: &[bool]| {
-        let fit = written(search, &certain_causes(&search.extended, certain), discrepancy);
+        let fit = written(search, &certain_causes(&search.full_fit, certain), discrepancy);
         WrittenFit { errors: search.validation.stage(&fit), fit }
     };
     let found = of(certain);
@@ -330,10 +329,10 @@ fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Dis
         found.errors.random.rmse < than.random.rmse && found.errors.blocks.rmse < than.blocks.rmse
     };
     let arm_alone = found.fit.causes.iter().all(of_the_arm);
-    if !found.fit.causes.iter().any(of_the_arm) || arm_alone && better(&search.stages[1]) {
+    if !found.fit.causes.iter().any(of_the_arm) || arm_alone && better(&search.errors.geometric) {
         return found;
     }
-    let causes = &search.extended.causes;
+    let causes = &search.full_fit.causes;
     let without: Vec<bool> =
         certain.iter().zip(causes).map(|(sure, cause)| *sure && !is_carried(cause)).collect();
     let plain = of(&without);
@@ -371,7 +370,7 @@ fn with_uncertain_causes(
     fit: &Extended,
     discrepancy: Option<&Discrepancy>,
 ) -> Option<Extended> {
-    let all = in_doubt::representable_causes(&search.extended.causes, &search.accepted);
+    let all = in_doubt::representable_causes(&search.full_fit.causes, &search.accepted);
     let missing = |cause: &Cause| !contains_cause(&fit.causes, cause);
     all.iter().any(missing).then(|| in_doubt::with_zero_causes(fit, written(search, &all, discrepancy)))
 }
@@ -385,7 +384,7 @@ struct Judged<'a> {
     /// That the poses do not show the target's place on the flange.
     unseen_target: Option<Reason>,
     /// Errors of the data sheet, of geometry, and of the fit.
-    stages: [StageError; 3],
+    errors: ErrorsByStage,
     /// How many rows were set aside, of how many.
     set_aside: (usize, usize),
     options: &'a Options,
@@ -399,16 +398,18 @@ pub(super) fn too_many_aside(aside: usize, rows: usize) -> bool {
 /// The verdict of an identification, plus: a third of the rows must not be set aside, and findings must not raise the held-out error of geometry.
 fn judge(case: &Judged<'_>) -> Verdict {
     let mut verdict = VerdictBuilder::default();
-    let stages = &case.stages;
+    let ErrorsByStage { registered, geometric, with_causes } = &case.errors;
     if case.fitted.termination().is_converged() {
         verdict.note(Reason::new(ReasonKind::Converged, "the fit converged"));
     } else {
         verdict.fail(format!("the fit did not converge: {}", case.fitted.termination()));
     }
-    if stages[2].blocks.rmse > stages[1].blocks.rmse * 1.05 && stages[2].random.rmse > stages[1].random.rmse {
+    if with_causes.blocks.rmse > geometric.blocks.rmse * 1.05
+        && with_causes.random.rmse > geometric.random.rmse
+    {
         verdict.fail(format!(
             "the held-out error is {:.3} mm with the findings, but {:.3} mm with geometry alone",
-            stages[2].random.rmse, stages[1].random.rmse
+            with_causes.random.rmse, geometric.random.rmse
         ));
     }
     let (aside, rows) = case.set_aside;
@@ -419,11 +420,11 @@ fn judge(case: &Judged<'_>) -> Verdict {
         ));
     }
     verdict.check_links(case.parameters, &case.options.arm_tolerance, LINK_Z);
-    verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
+    verdict.check_held_out(registered.random.rmse, with_causes.random.rmse);
     verdict.check_benefit(case.benefit, case.sensor);
     if let Some(unseen_target) = &case.unseen_target {
         verdict.note(unseen_target.clone());
     }
-    verdict.check_limits(&case.options.limits, &stages[2].random);
+    verdict.check_limits(&case.options.limits, &with_causes.random);
     verdict.build()
 }

@@ -197,7 +197,7 @@ impl Diagnosed {
             return Some(Foreign::NotThisArm);
         }
         let estimated = &self.estimated;
-        let held_out_mm = estimated.geometry.held_out.rmse / per_axis(estimated.provenance.sensor);
+        let held_out_mm = estimated.calibrated.held_out.rmse / per_axis(estimated.provenance.sensor);
         if !(left_mm > FOREIGN_MM && left_mm > FOREIGN_IF_CHANGED * held_out_mm) {
             return None;
         }
@@ -260,7 +260,7 @@ impl Diagnosed {
             if verdict.status != Judgement::Fail {
                 verdict.status = status;
             }
-            let held_out_mm = self.estimated.geometry.held_out.rmse;
+            let held_out_mm = self.estimated.calibrated.held_out.rmse;
             verdict.reasons.insert(
                 0,
                 format!(

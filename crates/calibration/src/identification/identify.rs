@@ -236,7 +236,7 @@ pub fn identify(
         provenance: Provenance { sharpened, ..provenance(dataset, &observed, &outliers, options) },
         parameters: select_arm_parameters(&parameters),
         registered: trained.registered,
-        geometry: trained.geometry,
+        calibrated: trained.geometry,
         noise_floor_mm: noise_floor(repeats.as_ref(), &observed, &geometry),
         beyond_noise_mm: None,
         beyond_noise_rad: None,

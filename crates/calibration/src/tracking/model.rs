@@ -42,7 +42,7 @@ impl Tracker {
             out.provenance.sha256.clone_from(&last.digest);
         }
         if !self.state.history.is_empty() {
-            out.geometry.fitted = ErrorSummary::of(self.state.history.iter().map(|s| s.error_mm));
+            out.calibrated.fitted = ErrorSummary::of(self.state.history.iter().map(|s| s.error_mm));
         }
         out.condition = self.condition;
         out.region.clone_from(&self.state.region);

@@ -132,8 +132,8 @@ fn errors(text: &mut String, found: &Identification) {
     }
     row("frames, fitted rows", &estimated.registered.fitted);
     row("frames, held out", &estimated.registered.held_out);
-    row("geometry, fitted rows", &estimated.geometry.fitted);
-    row("geometry, held out", &estimated.geometry.held_out);
+    row("geometry, fitted rows", &estimated.calibrated.fitted);
+    row("geometry, held out", &estimated.calibrated.held_out);
     let _ = writeln!(
         text,
         "\nNoise floor {} mm; {} rows set aside.\n",

@@ -57,7 +57,7 @@ fn by_hand() -> Identification {
         max: 2.0 * rmse,
     };
     found.estimated.registered = StageErrors { fitted: summary(96, 2.0), held_out: summary(24, 2.1) };
-    found.estimated.geometry = StageErrors { fitted: summary(96, 0.4), held_out: summary(24, 0.5) };
+    found.estimated.calibrated = StageErrors { fitted: summary(96, 0.4), held_out: summary(24, 0.5) };
     found
 }
 
@@ -308,7 +308,7 @@ fn the_json_holds_everything_and_every_held_out_row() {
     assert_eq!(rows[0]["row"], found.held_out[0].0);
     assert_eq!(rows[0]["geometry_mm"], found.held_out[0].2);
     assert!(json["stages"]["raw"].is_null());
-    assert_eq!(json["stages"]["geometry"]["held_out"]["rmse"], found.estimated.geometry.held_out.rmse);
+    assert_eq!(json["stages"]["geometry"]["held_out"]["rmse"], found.estimated.calibrated.held_out.rmse);
     let arm = json["parameters"].as_array().unwrap();
     let frames = json["frames"].as_array().unwrap();
     assert_eq!(arm.len(), 24);
