@@ -1,5 +1,7 @@
 //! The whole diagnosis of one data set.
 
+use std::cell::OnceCell;
+
 use super::cause::Cause;
 use super::cause_kind::CauseKind;
 use super::data_quality::single_angles;
@@ -124,6 +126,7 @@ pub fn diagnose(
         is_log_rounded,
         repeats,
         few_poses,
+        identified: OnceCell::new(),
     };
     let HandedOver { estimated, benefit } = handover.arm(&certain, &mut diagnosis.notes);
     diagnosis.verdict = Some(estimated.verdict.clone());

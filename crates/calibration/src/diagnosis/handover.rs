@@ -16,7 +16,7 @@ use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
 use crate::identification::fit::Fitted;
 use crate::identification::identify::{
-    self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, median_condition,
+    self, arm_covariance, arm_parameters_of, learned_width_uncertainty, median_condition,
     with_sigma_in_region,
 };
 use crate::identification::inflation::inflation_from_errors;
@@ -28,6 +28,7 @@ use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::NoiseFloor;
 use crate::measurement::split;
 use nalgebra::DMatrix;
+use std::cell::OnceCell;
 use truegrind_arm::estimated::{
     Estimated, EstimatedParameter, Judgement, Provenance, Reason, ReasonKind, StageErrors, Verdict,
 };
@@ -54,6 +55,8 @@ pub(super) struct Handover<'a> {
     pub(super) repeats: Option<NoiseFloor>,
     /// Says that there are too few poses.
     pub(super) few_poses: Option<String>,
+    /// The geometry of [`identified`], once it was asked for.
+    pub(super) identified: OnceCell<Option<Fitted>>,
 }
 
 /// The arm for compensation.
@@ -145,18 +148,25 @@ impl Handover<'_> {
     /// that fit has other parameters or failed.
     fn as_identified(&self, written: &Extended) -> Option<Extended> {
         let Fitted { parameters, priors, estimate, model, frames, problem, .. } =
-            identified(self.search.context, self.robot)?.geometry;
+            self.identified.get_or_init(|| identified(self.search.context, self.robot)).as_ref()?;
         let place = |p| parameters.iter().position(|q| q == p);
         let places = written.parameters.iter().map(place).collect::<Option<Vec<usize>>>()?;
         // Rows that it rejects are few: those left count as consecutive.
         let numbers: Vec<usize> = (0..problem.rows() / problem.rows_per_observation()).collect();
         let own = estimate.covariance.as_ref()?;
-        let own = under_correlated_noise(&problem, &estimate.x, own, self.discrepancy, &numbers);
+        let own = under_correlated_noise(problem, &estimate.x, own, self.discrepancy, &numbers);
         let covariance = DMatrix::from_fn(places.len(), places.len(), |a, b| own[(places[a], places[b])]);
         let x: Vec<f64> = places.iter().map(|&k| estimate.x[k]).collect();
         let priors = places.iter().map(|&k| priors[k]).collect();
-        let estimate = Estimate { x: x.clone(), covariance: Some(covariance), ..estimate };
-        Some(Extended { priors, x, model, frames, estimate, ..written.clone() })
+        let estimate = Estimate { x: x.clone(), covariance: Some(covariance), ..estimate.clone() };
+        Some(Extended {
+            priors,
+            x,
+            model: model.clone(),
+            frames: frames.clone(),
+            estimate,
+            ..written.clone()
+        })
     }
 
     /// The arm for compensation and its expected benefit. What it lacks stands in its covariance. Of too few poses no benefit is stated:
@@ -293,8 +303,8 @@ impl Handover<'_> {
     }
 }
 
-/// The same rows identified, with the options of the diagnosis and beside the same frames.
-fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification> {
+/// Geometry fitted to the same rows as `identify` does, with the options of the diagnosis and beside the same frames.
+fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Fitted> {
     let SearchContext { dataset, subject, options, .. } = context;
     let defaults = identify::Options::default();
     let alone = identify::Options {
@@ -306,7 +316,7 @@ fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification
         ..defaults
     };
     let share = |rows: &Dataset| split::random(rows, alone.held_out, alone.seed);
-    identify::identify(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
+    identify::fit_geometry(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
 }
 
 /// The model with `causes` under the tolerances of the arm.
