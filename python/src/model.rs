@@ -6,7 +6,6 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::FlangePoint;
 use truegrind::{Estimated, Judgement, Pose, robots};
 
@@ -31,11 +30,6 @@ pub(crate) struct PyModel {
     text: String,
 }
 
-/// First twelve hex digits of the SHA-256.
-fn hash(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().take(6).map(|b| format!("{b:02x}")).collect()
-}
-
 /// Verdict as written in files.
 pub(crate) fn word(status: Judgement) -> &'static str {
     match status {
@@ -53,7 +47,7 @@ impl PyModel {
         Ok(Self {
             arm: Arc::new(arm.clone()),
             name: "model.toml".to_owned(),
-            hash: hash(text.as_bytes()),
+            hash: Estimated::file_hash(&text),
             text,
         })
     }
@@ -73,7 +67,7 @@ impl PyModel {
             return Err(Refusal::new(Kind::Model, message).of_file(name));
         }
         Ok(Self {
-            hash: hash(text.as_bytes()),
+            hash: Estimated::file_hash(&text),
             name: name.to_owned(),
             arm: Arc::new(arm),
             text: text.to_owned(),

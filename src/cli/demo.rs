@@ -85,7 +85,7 @@ impl Job<'_> {
         let model = estimated.to_toml()?;
         let mark = Mark {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            model: inputs::hash(model.as_bytes()),
+            model: Estimated::file_hash(&model),
             partial: false,
         };
         let done = compensate(self.task, estimated, self.cell, &bounds, Some(mark))?;

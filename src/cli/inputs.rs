@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
 use truegrind::programs::reading::Language;
@@ -125,7 +124,7 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
             arm.verdict.sentences().join("; ")
         );
     }
-    let hash = hash(text.as_bytes());
+    let hash = Estimated::file_hash(&text);
     Ok(NamedModel::Estimated { name: files::name(path), hash, arm: Box::new(arm) })
 }
 
@@ -177,11 +176,6 @@ pub(super) fn warn_doubtful(model: &NamedModel) {
             arm.verdict.sentences().join("; ")
         ));
     }
-}
-
-/// First twelve hex digits of the SHA-256.
-pub(super) fn hash(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().take(6).map(|b| format!("{b:02x}")).collect()
 }
 
 /// Name and nominal arm of the robot; `--robot` must match the model.

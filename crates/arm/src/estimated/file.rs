@@ -45,6 +45,13 @@ impl Estimated {
         Ok(format!("# An estimated arm, written by truegrind {}.\n{text}", self.provenance.version))
     }
 
+    /// The hash of a model file by which corrected programs name it: the first twelve hex digits of the SHA-256.
+    pub fn file_hash(text: &str) -> String {
+        let mut hash = truegrind_math::digest::sha256(text.as_bytes());
+        hash.truncate(12);
+        hash
+    }
+
     /// Reads the file. Every number is finite and such as an arm has, the covariance is positive semi-definite, and the
     /// parameters are the arm's.
     ///
