@@ -64,6 +64,7 @@ fn problem(rows: usize) -> (CalibrationProblem, Vec<f64>) {
         .collect();
     let weights = vec![Weight { per_mm: 1.0 / 0.03, per_rad: 1.0 }; rows.len()];
     let dataset = Dataset {
+        joined_by_time: false,
         station_names: Vec::new(),
         file: "made".into(),
         sha256: String::new(),

@@ -160,7 +160,7 @@ fn estimated(joints: &[Joints]) -> Estimated {
         width_uncertainty: None,
         provenance: Provenance::default(),
         registered: still,
-        geometry: still,
+        calibrated: still,
         noise_floor_mm: None,
         beyond_noise_mm: None,
         beyond_noise_rad: None,

@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         rows.rows.len()
     );
     println!("  frames registered  {:.3} mm", errors.registered.held_out.rmse);
-    println!("  geometry fitted    {:.3} mm", errors.geometry.held_out.rmse);
+    println!("  geometry fitted    {:.3} mm", errors.calibrated.held_out.rmse);
     for parameter in found.parameters.iter().take(6) {
         println!(
             "  {:<14} {:>10.5} ± {:.5} {}",

@@ -57,7 +57,8 @@ pub use truegrind_arm::effect::smooth_correction::SmoothCorrection;
 pub use truegrind_arm::effect::thermal::Thermal;
 pub use truegrind_arm::effect::{Effect, EffectParameter};
 pub use truegrind_arm::estimated::{
-    Estimated, EstimatedParameter, FlangePoint, Judgement, ModelFileError, Provenance, StageErrors, Verdict,
+    Estimated, EstimatedParameter, FlangePoint, Judgement, ModelFileError, Provenance, Reason, ReasonKind,
+    StageErrors, Verdict,
 };
 pub use truegrind_arm::inverse::Inverse;
 pub use truegrind_arm::inverse::configuration::Configuration;

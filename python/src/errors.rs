@@ -63,9 +63,8 @@ pub(crate) struct Refusal {
 }
 
 /// Command line options and the corresponding keywords.
-const KEYWORDS: [(&str, &str); 12] = [
+const KEYWORDS: [(&str, &str); 10] = [
     ("--allow-odd-units", "allow_odd_units=True"),
-    ("--allow-doubtful", "allow_doubtful=True"),
     ("--angles dh", "angles=\"dh\""),
     ("--base LINK --tip LINK", "truegrind.Robot(file, base=LINK, tip=LINK)"),
     ("--robot", "the robot"),
@@ -75,7 +74,6 @@ const KEYWORDS: [(&str, &str); 12] = [
     ("--outlet", "outlets_mm"),
     ("--sensor-frame", "sensor_frame"),
     ("--cell", "cell"),
-    ("--again", "again=True"),
 ];
 
 /// An argument may be a whole file.

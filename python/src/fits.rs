@@ -45,19 +45,19 @@ impl PyIdentification {
     /// Reasons for the verdict, one sentence each.
     #[getter]
     fn reasons(&self) -> Vec<String> {
-        self.found.estimated.verdict.reasons.clone()
+        self.found.estimated.verdict.sentences().into_iter().map(str::to_owned).collect()
     }
 
     /// RMS error on held-out rows (mm).
     #[getter]
     fn held_out_rmse_mm(&self) -> f64 {
-        self.found.estimated.geometry.held_out.rmse
+        self.found.estimated.calibrated.held_out.rmse
     }
 
     /// Largest error on held-out rows (mm).
     #[getter]
     fn held_out_max_mm(&self) -> f64 {
-        self.found.estimated.geometry.held_out.max
+        self.found.estimated.calibrated.held_out.max
     }
 
     /// RMS error on held-out rows of the nominal arm with a fitted sensor frame (mm).
@@ -253,7 +253,7 @@ impl PyDiagnosis {
     /// Reasons for the verdict, one sentence each.
     #[getter]
     fn reasons(&self) -> Vec<String> {
-        self.found.estimated.verdict.reasons.clone()
+        self.found.estimated.verdict.sentences().into_iter().map(str::to_owned).collect()
     }
 
     /// The causes, largest first: dictionaries as in the JSON.

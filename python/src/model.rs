@@ -6,7 +6,6 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::FlangePoint;
 use truegrind::{Estimated, Judgement, Pose, robots};
 
@@ -31,11 +30,6 @@ pub(crate) struct PyModel {
     text: String,
 }
 
-/// First twelve hex digits of the SHA-256.
-fn hash(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().take(6).map(|b| format!("{b:02x}")).collect()
-}
-
 /// Verdict as written in files.
 pub(crate) fn word(status: Judgement) -> &'static str {
     match status {
@@ -53,7 +47,7 @@ impl PyModel {
         Ok(Self {
             arm: Arc::new(arm.clone()),
             name: "model.toml".to_owned(),
-            hash: hash(text.as_bytes()),
+            hash: Estimated::file_hash(&text),
             text,
         })
     }
@@ -68,12 +62,12 @@ impl PyModel {
         robots::check_catalogue_name(&arm.robot, &arm.nominal)
             .map_err(|error| Refusal::new(Kind::Model, format!("{name}: {error}")).of_file(name))?;
         if arm.verdict.status == Judgement::Fail {
-            let why = arm.verdict.reasons.join("; ");
+            let why = arm.verdict.sentences().join("; ");
             let message = format!("{name}: this model cannot be used, since its fit failed: {why}");
             return Err(Refusal::new(Kind::Model, message).of_file(name));
         }
         Ok(Self {
-            hash: hash(text.as_bytes()),
+            hash: Estimated::file_hash(&text),
             name: name.to_owned(),
             arm: Arc::new(arm),
             text: text.to_owned(),
@@ -87,7 +81,7 @@ impl PyModel {
     /// Refuses a doubtful model unless allowed.
     pub(crate) fn allowed(&self, allow_doubtful: bool) -> Result<(), Refusal> {
         let verdict = &self.arm.verdict;
-        let why = || verdict.reasons.join("; ");
+        let why = || verdict.sentences().join("; ");
         match verdict.status {
             Judgement::Fail => {
                 let message =
@@ -171,7 +165,7 @@ impl PyModel {
     /// Reasons for the verdict, one sentence each.
     #[getter]
     fn reasons(&self) -> Vec<String> {
-        self.arm.verdict.reasons.clone()
+        self.arm.verdict.sentences().into_iter().map(str::to_owned).collect()
     }
 
     /// First twelve hex digits of the SHA-256 of the model file; written into corrected programs.
@@ -183,7 +177,7 @@ impl PyModel {
     /// RMS error on held-out rows (mm).
     #[getter]
     fn held_out_rmse_mm(&self) -> f64 {
-        self.arm.geometry.held_out.rmse
+        self.arm.calibrated.held_out.rmse
     }
 
     /// RMS error on held-out rows of the nominal arm with a fitted sensor frame (mm).
@@ -294,7 +288,7 @@ impl PyModel {
         format!(
             "<Model of {}: held-out RMSE {:.4} mm, verdict {}>",
             self.arm.robot,
-            self.arm.geometry.held_out.rmse,
+            self.arm.calibrated.held_out.rmse,
             word(self.arm.verdict.status)
         )
     }

@@ -445,7 +445,7 @@ fn corrected(
         points: std::mem::take(&mut plan.points),
         differences: Vec::new(),
         between: None,
-        held_out_mm: Some(arm.geometry.held_out.rmse),
+        held_out_mm: Some(arm.calibrated.held_out.rmse),
     };
     let unused = Used::by(listing, &cell).notes(&cell, surface.as_ref());
     let listing = listing.clone();

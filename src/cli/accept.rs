@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::Args;
-use sha2::{Digest, Sha256};
 use truegrind::calibration::acceptance::{Options, accept};
+use truegrind::math::digest::sha256;
 use truegrind::report::acceptance::{self as view, Statement};
 
 use super::computation::{Common, watching};
@@ -74,8 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
             "--model nominal: an acceptance test needs an estimated arm, as written by `truegrind identify -o`"
         );
     };
-    let hash: String =
-        Sha256::digest(files::read(&arguments.model)?).iter().map(|byte| format!("{byte:02x}")).collect();
+    let hash = sha256(&files::read(&arguments.model)?);
     // Refuses a robot other than that of the model.
     let stated = arguments.robot.as_deref().map(|name| arguments.links.of(name));
     inputs::nominal(&named, stated)?;

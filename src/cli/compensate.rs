@@ -155,7 +155,7 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
             points: std::mem::take(&mut planned.points),
             differences: Vec::new(),
             between: None,
-            held_out_mm: context.corrector.map(|c| c.arm.geometry.held_out.rmse),
+            held_out_mm: context.corrector.map(|c| c.arm.calibrated.held_out.rmse),
         };
         let reports = if context.corrector.is_some() { std::slice::from_ref(&report) } else { &[] };
         outputs.add_made(

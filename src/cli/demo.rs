@@ -85,7 +85,7 @@ impl Job<'_> {
         let model = estimated.to_toml()?;
         let mark = Mark {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            model: inputs::hash(model.as_bytes()),
+            model: Estimated::file_hash(&model),
             partial: false,
         };
         let done = compensate(self.task, estimated, self.cell, &bounds, Some(mark))?;
@@ -110,7 +110,7 @@ impl Job<'_> {
             condition: self.condition,
         };
         let mut report = verify(&judged, &acting);
-        report.held_out_mm = Some(estimated.geometry.held_out.rmse);
+        report.held_out_mm = Some(estimated.calibrated.held_out.rmse);
         for (point, planned) in report.points.iter_mut().zip(&planned.points) {
             (point.sigma_mm, point.outside) = (planned.sigma_mm, planned.outside);
             (point.status, point.reason) = (planned.status, planned.reason.clone());

@@ -111,7 +111,7 @@ fn read_back(bare: &Model, robot: &str, format: Format) -> anyhow::Result<Model>
 
 /// The error of the links according to the model file.
 fn stated_error(arm: &Estimated) -> String {
-    let error = arm.geometry.held_out.rmse;
+    let error = arm.calibrated.held_out.rmse;
     if has_links_only(&arm.model) {
         format!("held-out error of these links: {error:.4} mm RMS; they contain the whole model")
     } else {

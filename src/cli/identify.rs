@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
 
-use truegrind::arm::estimated::{Estimated, Judgement};
+use truegrind::arm::estimated::{Estimated, Judgement, Reason, ReasonKind};
 use truegrind::arm::model::Model;
 use truegrind::calibration::identification::calibration::Frames;
 use truegrind::calibration::identification::identify::{Identification, Options, identify};
@@ -13,7 +13,7 @@ use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::solver::{SOLVERS, by_name};
 use truegrind::calibration::identification::study::study;
 use truegrind::calibration::identification::tolerance::Tolerance;
-use truegrind::calibration::identification::verdict::{CONVERGED, Limits, NO_LIMITS};
+use truegrind::calibration::identification::verdict::Limits;
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import::{self, TimeMatching};
@@ -291,9 +291,9 @@ pub(super) fn reason_not_written(estimated: &Estimated, allow_doubtful: bool) ->
         Judgement::Doubtful if !allow_doubtful => "the model is doubtful (--allow-doubtful writes it anyway)",
         _ => return None,
     };
-    let against = estimated.verdict.reasons.iter().map(String::as_str);
-    let against: Vec<&str> =
-        against.filter(|reason| !reason.ends_with(CONVERGED) && *reason != NO_LIMITS).collect();
+    let is_against = |reason: &&Reason| !matches!(reason.kind, ReasonKind::Converged | ReasonKind::NoLimits);
+    let against = estimated.verdict.reasons.iter().filter(is_against);
+    let against: Vec<&str> = against.map(|reason| reason.text.as_str()).collect();
     Some(format!("was not written, because {reason}: {}", against.join("; ")))
 }
 

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
 use truegrind::programs::reading::Language;
@@ -122,10 +121,10 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     if arm.verdict.status == Judgement::Fail {
         bail!(
             "{argument}: this model cannot be used, since its fit failed: {}",
-            arm.verdict.reasons.join("; ")
+            arm.verdict.sentences().join("; ")
         );
     }
-    let hash = hash(text.as_bytes());
+    let hash = Estimated::file_hash(&text);
     Ok(NamedModel::Estimated { name: files::name(path), hash, arm: Box::new(arm) })
 }
 
@@ -161,7 +160,7 @@ pub(super) fn refuse_doubtful(model: &NamedModel, allowed: bool) -> anyhow::Resu
     if arm.verdict.status == Judgement::Doubtful && !allowed {
         bail!(
             "{name}: this model is doubtful, so programs are corrected with it only with --allow-doubtful: {}",
-            arm.verdict.reasons.join("; ")
+            arm.verdict.sentences().join("; ")
         );
     }
     warn_doubtful(model);
@@ -174,14 +173,9 @@ pub(super) fn warn_doubtful(model: &NamedModel) {
     if arm.verdict.status == Judgement::Doubtful {
         print_message(format_args!(
             "note: {name}: this model is doubtful: {}",
-            arm.verdict.reasons.join("; ")
+            arm.verdict.sentences().join("; ")
         ));
     }
-}
-
-/// First twelve hex digits of the SHA-256.
-pub(super) fn hash(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().take(6).map(|b| format!("{b:02x}")).collect()
 }
 
 /// Name and nominal arm of the robot; `--robot` must match the model.

@@ -269,7 +269,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
         missing: None,
         differences: Vec::new(),
         between: None,
-        held_out_mm: Some(arm.geometry.held_out.rmse),
+        held_out_mm: Some(arm.calibrated.held_out.rmse),
     };
     let scene = PathScene {
         title: &format!("{name}: {} as estimated", arm.robot),

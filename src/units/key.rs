@@ -1,6 +1,8 @@
 //! Keys of runs and units: SHA-256 over length-prefixed fields.
 
 use sha2::{Digest, Sha256};
+use truegrind_math::digest::hex;
+pub use truegrind_math::digest::sha256;
 
 /// A hash over fields, each prefixed with its length, so that different lists of fields never hash the same bytes.
 #[derive(Debug, Clone)]
@@ -33,17 +35,6 @@ impl Fields {
     pub fn hex(self) -> String {
         hex(&self.digest())
     }
-}
-
-/// SHA-256 of bytes, in hexadecimal.
-pub fn sha256(bytes: &[u8]) -> String {
-    hex(&Sha256::digest(bytes))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 16] = b"0123456789abcdef";
-    let digit = |half: u8| char::from(DIGITS[usize::from(half)]);
-    bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
 }
 
 /// The key of a run: version, verb, options, and the content of the files that all units use (model, robot, cell, surface and its mesh).

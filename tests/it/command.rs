@@ -307,7 +307,7 @@ fn outliers_are_found_listed_and_do_no_harm() {
         let arm =
             truegrind::arm::estimated::Estimated::from_toml(&fs::read_to_string(at.join(&model)).unwrap())
                 .unwrap();
-        (arm.geometry.held_out.rmse, arm.provenance.set_aside)
+        (arm.calibrated.held_out.rmse, arm.provenance.set_aside)
     };
     let (clean, none) = rmse("clean.csv", CABLE);
     assert!(none.is_empty(), "nothing is set aside on clean data: {none:?}");

@@ -7,6 +7,7 @@ mod checks;
 mod error;
 mod file;
 mod posterior;
+mod verdict;
 mod width_uncertainty;
 
 use nalgebra::{DMatrix, Vector3, Vector6};
@@ -25,31 +26,8 @@ use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 
 pub use error::{ModelFileError, SCHEMA};
+pub use verdict::{Judgement, Reason, ReasonKind, Verdict};
 pub use width_uncertainty::{PosteriorComponent, WidthUncertainty};
-
-/// How a fit is judged.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Judgement {
-    /// All stated limits are met.
-    Pass,
-    /// The fit may not be used.
-    Fail,
-    /// The data do not show that a correction helps: used only on explicit request.
-    Doubtful,
-    /// No objection to the fit, and no stated limits to judge it by.
-    NotEvaluated,
-}
-
-/// Judgement with its reasons.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Verdict {
-    /// The judgement.
-    pub status: Judgement,
-    /// One sentence each.
-    pub reasons: Vec<String>,
-}
 
 /// One identified number.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -141,8 +119,8 @@ pub struct Estimated {
     pub provenance: Provenance,
     /// Errors of the nominal arm with registered frames.
     pub registered: StageErrors,
-    /// Errors of the calibrated arm.
-    pub geometry: StageErrors,
+    /// Errors of the calibrated arm: with geometry, and after a diagnosis with its causes.
+    pub calibrated: StageErrors,
     /// Noise floor from sensor and rounding (mm); absent where it is unknown.
     pub noise_floor_mm: Option<f64>,
     /// RMS error of a position that the model leaves beyond the noise (mm); absent where the noise is unknown.

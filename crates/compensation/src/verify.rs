@@ -156,7 +156,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         }),
         differences,
         between,
-        held_out_mm: acting_arm.knowledge.map(|k| k.geometry.held_out.rmse),
+        held_out_mm: acting_arm.knowledge.map(|k| k.calibrated.held_out.rmse),
     }
 }
 

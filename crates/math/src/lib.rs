@@ -1,4 +1,4 @@
-//! Mathematical basis: rigid motions, numerical derivatives, statistics, SIMD kernels, parts of sentences, TOML texts, cancellable work.
+//! Mathematical basis: rigid motions, numerical derivatives, statistics, SIMD kernels, parts of sentences, TOML texts, digests, cancellable work.
 
 pub mod lanes;
 pub mod gram;
@@ -15,3 +15,4 @@ pub mod rounding;
 pub mod spectral;
 pub mod option_f64;
 pub mod work;
+pub mod digest;

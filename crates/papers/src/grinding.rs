@@ -349,7 +349,7 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
             return (case, None);
         }
     };
-    case.held_out = one.estimated.geometry.held_out;
+    case.held_out = one.estimated.calibrated.held_out;
     case.termination = one.training.termination();
     // The papers have no bounds and judge single points. Methods without priors move unobservable parameters by
     // centimetres; the wide bounds let such corrections pass, so that their consequence is measured.

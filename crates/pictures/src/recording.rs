@@ -21,6 +21,7 @@ use rerun::{
 };
 use sha2::{Digest, Sha256};
 use thiserror::Error;
+use truegrind_math::digest::hex;
 
 /// Default address of a Rerun viewer.
 pub const VIEWER: &str = rerun::DEFAULT_CONNECT_URL;
@@ -227,7 +228,7 @@ impl Store {
             self.chunks.iter().map(arrow).collect::<Result<Vec<_>, _>>()
         };
         let bytes = encoded(&messages_of(&name("content"))?)?;
-        let digest: String = Sha256::digest(&bytes).iter().take(16).map(|b| format!("{b:02x}")).collect();
+        let digest = hex(&Sha256::digest(&bytes)[..16]);
         let store_id = name(&digest);
         let source = StoreSource::Other("truegrind".to_owned());
         let info = StoreInfo::new(store_id.clone(), source);

@@ -152,7 +152,7 @@ fn key_figures(found: &Diagnosed) -> Vec<KeyFigure> {
     let benefit = found.benefit.as_ref().filter(|_| diagnosis.poses_needed.is_none());
     let mut figures = super::identification::benefit_figures(benefit);
     figures.extend([
-        KeyFigure::new("Held-out RMSE", found.estimated.geometry.held_out.rmse, 3, "mm").note(format!(
+        KeyFigure::new("Held-out RMSE", found.estimated.calibrated.held_out.rmse, 3, "mm").note(format!(
             "of the written arm; with all causes found: {:.3} mm; geometry alone: {:.3} mm",
             fits.extended.cv_rmse_mm, fits.geometric.cv_rmse_mm
         )),

@@ -88,7 +88,7 @@ impl Row {
             nominal_mm: Some(fits.nominal.cv_rmse_mm),
             geometric_mm: Some(fits.geometric.cv_rmse_mm),
             extended_mm: Some(fits.extended.cv_rmse_mm),
-            written_mm: Some(diagnosed.estimated.geometry.held_out.rmse),
+            written_mm: Some(diagnosed.estimated.calibrated.held_out.rmse),
             noise_floor_mm: found
                 .noise_floor_mm
                 .filter(|_| found.noise_floor_source != NoiseFloorSource::RoundingAlone),

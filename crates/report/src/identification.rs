@@ -12,14 +12,12 @@ use self::tables::row_number;
 use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
 use super::number::Precision;
 use super::status::Status;
-use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
+use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, ReasonKind};
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::identification::benefit::Benefit;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::identification::verdict::{
-    CONVERGED, NO_LIMITS, NOT_NOISE, TARGET_NOT_SHOWN, percent_of,
-};
+use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_calibration::measurement::dataset::Dataset;
 
 pub use tables::{
@@ -147,7 +145,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
         "stages": {
             "raw": found.raw.map(|all| json!({ "all": all })),
             "registered": estimated.registered,
-            "geometry": estimated.geometry,
+            "geometry": estimated.calibrated,
         },
         "parameters": parameters(true),
         "frames": parameters(false),
@@ -218,7 +216,7 @@ fn verdict(found: &Identification) -> Verdict {
 
 /// The verdict on an estimated arm, the same for identification and diagnosis.
 pub fn judged(estimated: &Estimated) -> Verdict {
-    let (before, after) = (estimated.registered.held_out.rmse, estimated.geometry.held_out.rmse);
+    let (before, after) = (estimated.registered.held_out.rmse, estimated.calibrated.held_out.rmse);
     // A diagnosis has a second held-out error beside it: that of the fit with all causes.
     let of = if estimated.provenance.method == "diagnose" { " of the written arm" } else { "" };
     let place = if shows_no_target(estimated) {
@@ -258,23 +256,23 @@ pub fn judged(estimated: &Estimated) -> Verdict {
     let mut reasons = estimated.verdict.reasons.clone();
     if matches!(estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated) {
         // The headline says what limits were stated, and an arm that may be used has converged.
-        reasons.retain(|reason| !reason.ends_with(CONVERGED) && reason != NO_LIMITS);
+        reasons.retain(|reason| !matches!(reason.kind, ReasonKind::Converged | ReasonKind::NoLimits));
         reasons.push(
             "what to do: correct programs with it (`truegrind compensate`), inside the measured region"
-                .to_owned(),
+                .into(),
         );
     }
-    Verdict::new(status, headline, reasons)
+    Verdict::new(status, headline, reasons.into_iter().map(|reason| reason.text))
 }
 
 /// Whether its verdict notes that repeated poses show more than noise.
 fn shows_more_than_noise(estimated: &Estimated) -> bool {
-    estimated.verdict.reasons.iter().any(|reason| reason.starts_with(NOT_NOISE))
+    estimated.verdict.has(ReasonKind::MoreThanNoise)
 }
 
 /// Whether its verdict notes that the poses do not show where the target sits.
 fn shows_no_target(estimated: &Estimated) -> bool {
-    estimated.verdict.reasons.iter().any(|reason| reason.contains(TARGET_NOT_SHOWN))
+    estimated.verdict.has(ReasonKind::TargetNotShown)
 }
 
 /// Expected deviation of programs before and after correction.
@@ -315,7 +313,7 @@ fn too_few_repeats(found: &Identification) -> String {
 
 fn key_figures(found: &Identification) -> Vec<KeyFigure> {
     let estimated = &found.estimated;
-    let (before, after) = (&estimated.registered.held_out, &estimated.geometry.held_out);
+    let (before, after) = (&estimated.registered.held_out, &estimated.calibrated.held_out);
     let gain = if before.rmse > 0.0 { 100.0 * (1.0 - after.rmse / before.rmse) } else { f64::NAN };
     let floor = KeyFigure::new("Noise floor", estimated.noise_floor_mm, 3, "mm");
     let used = estimated.provenance.rows;

@@ -39,7 +39,7 @@ pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
         return Err(InvalidValue::new("robot", "nothing", "the name of the arm"));
     }
     arms(&model.nominal, &model.model)?;
-    for (key, errors) in [("registered", &model.registered), ("geometry", &model.geometry)] {
+    for (key, errors) in [("registered", &model.registered), ("geometry", &model.calibrated)] {
         stage(errors).map_err(|invalid| invalid.within(key))?;
     }
     if let Some(beyond) = model.beyond_noise_mm {

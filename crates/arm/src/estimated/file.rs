@@ -24,7 +24,7 @@ impl Estimated {
             provenance: self.provenance.clone(),
             verdict: self.verdict.clone(),
             registered: self.registered,
-            geometry: self.geometry,
+            calibrated: self.calibrated,
             noise_floor_mm: self.noise_floor_mm,
             beyond_noise_mm: self.beyond_noise_mm,
             beyond_noise_rad: self.beyond_noise_rad,
@@ -43,6 +43,13 @@ impl Estimated {
         };
         let text = toml::to_string(&file).map_err(|e| ModelFileError::Unwritable(e.to_string()))?;
         Ok(format!("# An estimated arm, written by truegrind {}.\n{text}", self.provenance.version))
+    }
+
+    /// The hash of a model file by which corrected programs name it: the first twelve hex digits of the SHA-256.
+    pub fn file_hash(text: &str) -> String {
+        let mut hash = truegrind_math::digest::sha256(text.as_bytes());
+        hash.truncate(12);
+        hash
     }
 
     /// Reads the file. Every number is finite and such as an arm has, the covariance is positive semi-definite, and the
@@ -67,7 +74,7 @@ impl Estimated {
     /// #     width_uncertainty: None,
     /// #     provenance: Provenance::default(),
     /// #     registered: stage,
-    /// #     geometry: stage,
+    /// #     calibrated: stage,
     /// #     noise_floor_mm: None,
     /// #     beyond_noise_mm: None,
     /// #     beyond_noise_rad: None,
@@ -126,7 +133,7 @@ impl Estimated {
             width_uncertainty: file.width_uncertainty,
             provenance: file.provenance,
             registered: file.registered,
-            geometry: file.geometry,
+            calibrated: file.calibrated,
             noise_floor_mm: file.noise_floor_mm,
             beyond_noise_mm: file.beyond_noise_mm,
             beyond_noise_rad: file.beyond_noise_rad,
@@ -176,7 +183,8 @@ struct ModelFile {
     verdict: Verdict,
     condition: Condition,
     registered: StageErrors,
-    geometry: StageErrors,
+    #[serde(rename = "geometry")]
+    calibrated: StageErrors,
     region: Region,
     nominal: ArmFile,
     estimated: ArmFile,

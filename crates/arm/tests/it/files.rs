@@ -130,7 +130,7 @@ fn complete() -> Estimated {
         order,
         provenance: Provenance { rows: 4, set_aside: vec![2], held_out: 0.2, ..Provenance::default() },
         registered: stage,
-        geometry: stage,
+        calibrated: stage,
         noise_floor_mm: Some(0.02),
         beyond_noise_mm: None,
         beyond_noise_rad: Some([1e-4, 1e-4, 1e-4, 2e-4, 2e-4, 3e-4]),

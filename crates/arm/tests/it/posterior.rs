@@ -69,7 +69,7 @@ fn arm(ratio: [f64; 3], width_uncertainty: Option<WidthUncertainty>) -> Estimate
         width_uncertainty,
         provenance: Provenance::default(),
         registered: stage,
-        geometry: stage,
+        calibrated: stage,
         noise_floor_mm: None,
         beyond_noise_mm: None,
         beyond_noise_rad: None,

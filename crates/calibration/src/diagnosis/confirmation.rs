@@ -154,7 +154,7 @@ pub(super) struct ConfirmationContext<'a> {
     /// The rows.
     pub subject: &'a Subject<'a>,
     /// The fit.
-    pub found: &'a Extended,
+    pub fit: &'a Extended,
     /// The linearised fit.
     pub linear: &'a Linear,
     /// The accepted causes.
@@ -186,7 +186,7 @@ impl ConfirmationContext<'_> {
         let numbers: Vec<usize> = self.subject.observed.dataset.rows.iter().map(|r| r.number).collect();
         let functions = Functions::of(self.subject, self.linear);
         let own: Vec<WithColumns> = self
-            .found
+            .fit
             .causes
             .par_iter()
             .map(|cause| {
@@ -202,7 +202,7 @@ impl ConfirmationContext<'_> {
                 columns: &own.columns,
                 sizes: own.candidate.cause.sizes(),
                 tried: accepted.tried,
-                parameters: self.found.parameter_indices(k).to_vec(),
+                parameters: self.fit.parameter_indices(k).to_vec(),
                 is_shift: own.candidate.cause.rows().is_some(),
             })
             .collect();
@@ -247,7 +247,7 @@ impl ConfirmationContext<'_> {
                 candidate: Arc::clone(&s.candidate),
             })
             .collect();
-        let every: Vec<usize> = (0..self.found.causes.len()).collect();
+        let every: Vec<usize> = (0..self.fit.causes.len()).collect();
         let design = whole.without(&self.parameter_indices(&every));
         let columns: Vec<DMatrix<f64>> = all.par_iter().map(|t| whiten(&t.columns)).collect();
         let projected = design.project_all(&columns);
@@ -266,7 +266,7 @@ impl ConfirmationContext<'_> {
     fn is_confounded_with_lag(&self, cause: &Cause) -> bool {
         let Cause::Arm(Effect::Backlash(backlash)) = cause else { return false };
         let lags =
-            self.found.causes.iter().any(|c| [CauseKind::Unsettled, CauseKind::Latency].contains(&c.kind()));
+            self.fit.causes.iter().any(|c| [CauseKind::Unsettled, CauseKind::Latency].contains(&c.kind()));
         self.sides_from_order && (lags || self.has_uniform_steps(backlash.joint))
     }
 
@@ -284,18 +284,18 @@ impl ConfirmationContext<'_> {
     /// Whether a deflection along horizontal axes, if it is one, is that of gravity in one direction.
     fn is_one_direction(&self, index: usize) -> bool {
         let (Cause::Arm(Effect::LumpedCompliance(load)), Some(covariance)) =
-            (&self.found.causes[index], &self.found.estimate.covariance)
+            (&self.fit.causes[index], &self.fit.estimate.covariance)
         else {
             return true;
         };
-        let own = self.found.parameter_indices(index);
-        let values: Vec<f64> = own.iter().map(|&k| self.found.x[k]).collect();
+        let own = self.fit.parameter_indices(index);
+        let values: Vec<f64> = own.iter().map(|&k| self.fit.x[k]).collect();
         let covariance = covariance.select_rows(&own).select_columns(&own);
         lump_direction::is_one_direction(load, &values, &covariance)
     }
 
     fn parameter_indices(&self, causes: &[usize]) -> Vec<usize> {
-        causes.iter().flat_map(|&k| self.found.parameter_indices(k)).collect()
+        causes.iter().flat_map(|&k| self.fit.parameter_indices(k)).collect()
     }
 
     /// The causes beside the discrepancy and beside their rivals there, not yet repeated in halves.
@@ -318,7 +318,7 @@ impl ConfirmationContext<'_> {
             .collect();
         removed.iter().for_each(|&k| out[k].significant = false);
         // A tilt that only joint 1 shows, which bears no weight in an upright arm, or that other joints contradict.
-        let causes = &self.found.causes;
+        let causes = &self.fit.causes;
         let is_supported =
             (0..out.len()).any(|k| causes[k].is_tilt() && !causes[k].requires_tilt() && out[k].plausible);
         if !is_supported {
@@ -331,7 +331,7 @@ impl ConfirmationContext<'_> {
     /// The merit of growth of each link with the course of `cause`, if that is a drift of the sensor; else 0. Beside growth that the fit
     /// has already, `confounding` compares the two.
     fn growth_of_links(&self, cause: &Cause, tried: f64, design: &Design, whiten: Whiten<'_>) -> f64 {
-        if self.found.causes.iter().any(Cause::is_growth_of_arm) {
+        if self.fit.causes.iter().any(Cause::is_growth_of_arm) {
             return 0.0;
         }
         let links = link_growth::columns(cause, self.subject, &self.linear.slopes, self.linear.per);

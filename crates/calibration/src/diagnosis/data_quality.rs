@@ -6,7 +6,7 @@ use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{Confidence, Finding, FoundParameter, Gain, NoiseFloorSource};
 use super::preparation::Prepared;
 use super::selection::BLOCKS;
-use super::validation::{StageError, Validation};
+use super::validation::{ErrorsByStage, StageError, Validation};
 use super::words;
 use crate::identification::fit::Observations;
 use crate::identification::rounding::{NotFused, angle_shares, rounding_floor_mm};
@@ -28,7 +28,7 @@ pub(super) fn rounding_finding(
     prepared: &Prepared,
     subject: &Subject<'_>,
     geometric: &Extended,
-    (stages, few_poses): (&[StageError; 3], bool),
+    (errors, few_poses): (&ErrorsByStage, bool),
 ) -> Option<Finding> {
     let step = dataset.angle_step_rad.filter(|_| !few_poses)?;
     let logged = &prepared.logged;
@@ -38,13 +38,13 @@ pub(super) fn rounding_finding(
     let raw = Subject { observed: logged, ..*subject };
     let unsharpened = fit(&raw, &[], Freedom::All, Some(geometric));
     let before = Validation::of(&raw, &[], 0, BLOCKS).random_rmse(&unsharpened);
-    let left = before.min(stages[2].random.rmse);
+    let left = before.min(errors.with_causes.random.rmse);
     if share < ROUNDING_SHARE * left * left {
         return None;
     }
     let (gain, evidence) = match &prepared.readout_fusion {
         Ok(report) => (
-            Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: stages[1].random.rmse },
+            Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: errors.geometric.random.rmse },
             format!(
                 "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; fused with the read-out they are known \
                  {:.1} times better",

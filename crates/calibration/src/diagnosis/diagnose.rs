@@ -1,5 +1,7 @@
 //! The whole diagnosis of one data set.
 
+use std::cell::OnceCell;
+
 use super::cause::Cause;
 use super::cause_kind::CauseKind;
 use super::data_quality::single_angles;
@@ -18,7 +20,7 @@ use super::search::{Confirmed, Search, SearchContext};
 use super::selection::is_same_effect;
 use super::summary::{self, Summary};
 use super::testability::not_testable;
-use super::validation::nominal;
+use super::validation::{StageError, nominal};
 use super::words;
 use crate::identification::benefit::Benefit;
 use crate::identification::beyond_noise::BeyondNoise;
@@ -90,20 +92,20 @@ pub fn diagnose(
     progress("stability selection in halves of the rows");
     let mut confirmed = search.confirm();
     search.purge_validation(&mut confirmed);
-    let structure = residual_tests::structure(&subject, &search.extended, &search.set_aside);
+    let structure = residual_tests::structure(&subject, &search.full_fit, &search.set_aside);
     let smoothed = search.fit_smooth_correction(&structure);
     let summary = summary::summarise(&search, &confirmed, &structure, (smoothed, needed.is_some()));
     let few_poses = needed.map(|needed| few_poses_note(dataset, needed));
     let mut notes: Vec<String> = few_poses.iter().cloned().collect();
     notes.append(&mut search.notes);
-    let mut finding_of_cause = vec![0; search.found.causes.len()];
+    let mut finding_of_cause = vec![0; search.searched_fit.causes.len()];
     for (index, merged) in summary.findings.iter().enumerate() {
         merged.causes.iter().for_each(|&k| finding_of_cause[k] = index);
     }
     let certain =
-        merged::certain_flags(&summary.findings, &confirmed.outcome.confirmations, &search.extended.causes);
+        merged::certain_flags(&summary.findings, &confirmed.outcome.confirmations, &search.full_fit.causes);
     let (extended, scatter) = (summary.extended.clone(), summary.joint_scatter.clone());
-    let all_causes = &search.stages[2];
+    let all_causes = &search.errors.with_causes;
     let all_causes = StageErrors { fitted: all_causes.fitted, held_out: all_causes.random };
     let parameters = extended.parameters.len();
     let mut beyond = BeyondNoise::of(&all_causes, parameters, dataset.sensor, summary.repeats.as_ref())
@@ -124,12 +126,13 @@ pub fn diagnose(
         is_log_rounded,
         repeats,
         few_poses,
+        identified: OnceCell::new(),
     };
     let HandedOver { estimated, benefit } = handover.arm(&certain, &mut diagnosis.notes);
     diagnosis.verdict = Some(estimated.verdict.clone());
     for (k, finding) in diagnosis.findings.iter_mut().enumerate() {
         let own = (0..finding_of_cause.len()).filter(|&cause| finding_of_cause[cause] == k);
-        let effects = own.filter_map(|cause| match &search.found.causes[cause] {
+        let effects = own.filter_map(|cause| match &search.searched_fit.causes[cause] {
             Cause::Arm(effect) => Some(effect),
             Cause::Measurement(_) => None,
         });
@@ -202,9 +205,9 @@ fn refuse_other_arm(
 /// are off by so much. What fits the others is then chance, or another set-up than that of the rest.
 fn refuse_other_rows(search: &Search<'_>, robot: &str) -> Result<(), DiagnoseError> {
     let dataset = search.context.dataset;
-    let errors = search.extended.problem.errors_mm(&search.extended.x);
+    let errors = search.full_fit.problem.errors_mm(&search.full_fit.x);
     let of_aside = ErrorSummary::of(search.set_aside.iter().map(|&row| errors[row]));
-    let left_mm = search.stages[2].fitted.rmse;
+    let left_mm = search.errors.with_causes.fitted.rmse;
     let is_of_another = too_many_aside(search.set_aside.len(), errors.len()) && of_aside.rmse > OTHER_ARM_MM;
     if left_mm < OTHER_ARM_MM && !is_of_another {
         return Ok(());
@@ -237,8 +240,8 @@ fn build_diagnosis(
 ) -> (Diagnosis, Vec<Option<Picture>>) {
     let SearchContext { dataset, prepared, subject, searched, .. } = search.context;
     let set_aside = &search.set_aside;
-    let noise = residual_tests::noise_model(subject, &search.extended, set_aside);
-    let kinds: Vec<CauseKind> = search.found.causes.iter().map(|c| c.kind()).collect();
+    let noise = residual_tests::noise_model(subject, &search.full_fit, set_aside);
+    let kinds: Vec<CauseKind> = search.searched_fit.causes.iter().map(|c| c.kind()).collect();
     let rows = &searched.observed.dataset;
     let not_testable = not_testable(rows, &confirmed.whole.design, &search.left, &kinds, prepared);
     if let Err(why) = &prepared.readout_fusion
@@ -251,7 +254,7 @@ fn build_diagnosis(
     }
     notes.extend(single_angles(dataset));
     if prepared.sides_from_order
-        && search.found.causes.iter().any(|c| matches!(c, Cause::Arm(Effect::Backlash(_))))
+        && search.searched_fit.causes.iter().any(|c| matches!(c, Cause::Arm(Effect::Backlash(_))))
     {
         notes.push(
             "the sides of approach were not logged (columns approach1 to approach6): backlash was judged as if the arm had come \
@@ -271,7 +274,7 @@ fn build_diagnosis(
     let question = decision::DecisionQuestion {
         robot,
         sensor: dataset.sensor,
-        frames: &search.extended.frames,
+        frames: &search.full_fit.frames,
         something_else: summary.something_else.as_ref(),
     };
     question.complete(&mut findings);
@@ -335,20 +338,18 @@ fn poses_needed_at_least(dataset: &Dataset, nominal: &Model) -> Option<usize> {
 /// The errors of the three stages.
 fn fits(search: &Search<'_>) -> Fits {
     (search.context.progress)("cross-validating over regions of joint space");
-    let stage = |k: usize, fit: &Extended| {
-        let errors = &search.stages[k];
-        Stage {
-            rmse_mm: errors.fitted.rmse,
-            mean_mm: errors.fitted.mean_absolute,
-            max_mm: errors.fitted.max,
-            cv_rmse_mm: errors.random.rmse,
-            cv_blocks_rmse_mm: errors.blocks.rmse,
-            cv_regions_rmse_mm: search.validation.over_regions(fit).rmse,
-        }
+    let stage = |errors: &StageError, fit: &Extended| Stage {
+        rmse_mm: errors.fitted.rmse,
+        mean_mm: errors.fitted.mean_absolute,
+        max_mm: errors.fitted.max,
+        cv_rmse_mm: errors.random.rmse,
+        cv_blocks_rmse_mm: errors.blocks.rmse,
+        cv_regions_rmse_mm: search.validation.over_regions(fit).rmse,
     };
+    let errors = &search.errors;
     Fits {
-        nominal: stage(0, &search.registered),
-        geometric: stage(1, &search.geometric),
-        extended: stage(2, &search.extended),
+        nominal: stage(&errors.registered, &search.registered),
+        geometric: stage(&errors.geometric, &search.geometric),
+        extended: stage(&errors.with_causes, &search.full_fit),
     }
 }

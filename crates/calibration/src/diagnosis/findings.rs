@@ -41,7 +41,7 @@ pub(super) struct FindingBuilder<'a> {
     /// The searched rows: all, or a subset of very many.
     pub(super) subject: &'a Subject<'a>,
     /// The fit to the searched rows.
-    pub(super) found: &'a Extended,
+    pub(super) fit: &'a Extended,
     /// The fit to all rows.
     pub(super) extended: &'a Extended,
     /// The linearised fit to the searched rows.
@@ -83,7 +83,7 @@ impl FindingBuilder<'_> {
             .enumerate()
             .map(|(index, own)| {
                 let later: Vec<usize> =
-                    (index + 1..accepted.len()).flat_map(|k| self.found.parameter_indices(k)).collect();
+                    (index + 1..accepted.len()).flat_map(|k| self.fit.parameter_indices(k)).collect();
                 let step = self.held.without(&later).rmse_mm(None, self.set_aside);
                 let (finding, picture) = self.finding(index, own, after_mm);
                 (step, finding, picture)
@@ -243,7 +243,7 @@ impl FindingBuilder<'_> {
     fn finding(&self, index: usize, own: &Accepted, after_mm: f64) -> (Finding, Picture) {
         let cause = &self.extended.causes[index];
         let parameters = words::found_parameters(self.extended, index);
-        let places = self.found.parameter_indices(index);
+        let places = self.fit.parameter_indices(index);
         let without = self.whole.without(&places);
         let held = self.held.without(&places);
         let before_mm = held.rmse_mm(None, self.set_aside);

@@ -10,25 +10,28 @@ use super::options::Options;
 use super::search::{Search, SearchContext};
 use super::selection::contains_cause;
 use super::sensor_causes::{self, probability_worse};
-use super::validation::StageError;
+use super::validation::{ErrorsByStage, StageError};
 use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
 use crate::identification::fit::Fitted;
 use crate::identification::identify::{
-    self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, median_condition,
+    self, arm_covariance, arm_parameters_of, learned_width_uncertainty, median_condition,
     with_sigma_in_region,
 };
 use crate::identification::inflation::inflation_from_errors;
 use crate::identification::linearised_readings::widen_by_scale;
 use crate::identification::parameter_table::parameter_table;
 use crate::identification::unseen_target::unseen_target;
-use crate::identification::verdict::{CONVERGED, VerdictBuilder};
+use crate::identification::verdict::VerdictBuilder;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::NoiseFloor;
 use crate::measurement::split;
 use nalgebra::DMatrix;
-use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
+use std::cell::OnceCell;
+use truegrind_arm::estimated::{
+    Estimated, EstimatedParameter, Judgement, Provenance, Reason, ReasonKind, StageErrors, Verdict,
+};
 use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::problem::Problem;
@@ -52,6 +55,8 @@ pub(super) struct Handover<'a> {
     pub(super) repeats: Option<NoiseFloor>,
     /// Says that there are too few poses.
     pub(super) few_poses: Option<String>,
+    /// The geometry of [`identified`], once it was asked for.
+    pub(super) identified: OnceCell<Option<Fitted>>,
 }
 
 /// The arm for compensation.
@@ -118,7 +123,7 @@ impl Handover<'_> {
         notes: &mut Vec<String>,
     ) -> HandedOver {
         let verdict = &with_causes.estimated.verdict;
-        if verdict.status != Judgement::Fail || self.search.extended.causes.is_empty() {
+        if verdict.status != Judgement::Fail || self.search.full_fit.causes.is_empty() {
             return with_causes;
         }
         let Some(plain) = self.as_identified(&written(self.search, &[], None)) else { return with_causes };
@@ -134,7 +139,7 @@ impl Handover<'_> {
         }
         notes.push(format!(
             "the written arm is geometry alone, as `identify` fits it, since the arm with causes was refused: {}",
-            verdict.reasons.first().map_or("it is implausible", String::as_str)
+            verdict.reasons.first().map_or("it is implausible", |reason| reason.text.as_str())
         ));
         alone
     }
@@ -143,18 +148,25 @@ impl Handover<'_> {
     /// that fit has other parameters or failed.
     fn as_identified(&self, written: &Extended) -> Option<Extended> {
         let Fitted { parameters, priors, estimate, model, frames, problem, .. } =
-            identified(self.search.context, self.robot)?.geometry;
+            self.identified.get_or_init(|| identified(self.search.context, self.robot)).as_ref()?;
         let place = |p| parameters.iter().position(|q| q == p);
         let places = written.parameters.iter().map(place).collect::<Option<Vec<usize>>>()?;
         // Rows that it rejects are few: those left count as consecutive.
         let numbers: Vec<usize> = (0..problem.rows() / problem.rows_per_observation()).collect();
         let own = estimate.covariance.as_ref()?;
-        let own = under_correlated_noise(&problem, &estimate.x, own, self.discrepancy, &numbers);
+        let own = under_correlated_noise(problem, &estimate.x, own, self.discrepancy, &numbers);
         let covariance = DMatrix::from_fn(places.len(), places.len(), |a, b| own[(places[a], places[b])]);
         let x: Vec<f64> = places.iter().map(|&k| estimate.x[k]).collect();
         let priors = places.iter().map(|&k| priors[k]).collect();
-        let estimate = Estimate { x: x.clone(), covariance: Some(covariance), ..estimate };
-        Some(Extended { priors, x, model, frames, estimate, ..written.clone() })
+        let estimate = Estimate { x: x.clone(), covariance: Some(covariance), ..estimate.clone() };
+        Some(Extended {
+            priors,
+            x,
+            model: model.clone(),
+            frames: frames.clone(),
+            estimate,
+            ..written.clone()
+        })
     }
 
     /// The arm for compensation and its expected benefit. What it lacks stands in its covariance. Of too few poses no benefit is stated:
@@ -177,7 +189,7 @@ impl Handover<'_> {
             None => {
                 // A scatter about a joint remains with and without correction, as what all causes leave beyond the noise does.
                 let scatter_mm = self.scatter.as_ref().map_or(0.0, JointScatter::rms_mm);
-                let inflation = inflation_from_errors(fitted, rows, &estimated.geometry);
+                let inflation = inflation_from_errors(fitted, rows, &estimated.calibrated);
                 // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
                 benefit(fitted, rows, &estimated, &options.arm_tolerance, inflation)
                     .map(|benefit| benefit.with_unmodelled(beyond_noise.at_least_scatter(scatter_mm)))
@@ -189,7 +201,7 @@ impl Handover<'_> {
             benefit: benefit.as_ref(),
             sensor: rows.sensor,
             unseen_target: unseen_target(handed, &self.kept_rows(), &estimated),
-            stages: self.stages(arm.errors),
+            errors: self.errors(arm.errors),
             set_aside: (self.search.set_aside.len(), rows.rows.len()),
             options,
         });
@@ -218,7 +230,7 @@ impl Handover<'_> {
     fn missing_errors(&self, arm: &WrittenArm<'_>) -> Vec<MissingError> {
         let search = self.search;
         let mut missing =
-            in_doubt::missing_errors(&search.context.subject, &search.extended, arm.with_uncertain);
+            in_doubt::missing_errors(&search.context.subject, &search.full_fit, arm.with_uncertain);
         // What a fault of the joint without a file leaves is known better than its scatter.
         let scatter = self.scatter.as_ref().map(MissingError::scatter);
         missing
@@ -228,7 +240,7 @@ impl Handover<'_> {
 
     /// What an arm leaves beyond the noise.
     fn beyond_noise_of(&self, arm: &WrittenArm<'_>) -> BeyondNoise {
-        let [all, beside_sensor, own] = [&self.search.stages[2], &arm.beside_sensor, &arm.errors]
+        let [all, beside_sensor, own] = [&self.search.errors.with_causes, &arm.beside_sensor, &arm.errors]
             .map(|s| StageErrors { fitted: s.fitted, held_out: s.random });
         let sensor = self.search.context.dataset.sensor;
         let of_arm = self.beyond_noise.of_submodel(&all, &beside_sensor, sensor, true);
@@ -242,9 +254,8 @@ impl Handover<'_> {
     }
 
     /// Errors of the data sheet, of geometry, and of the written fit.
-    fn stages(&self, own: StageError) -> [StageError; 3] {
-        let [before, geometry, _] = self.search.stages;
-        [before, geometry, own]
+    fn errors(&self, own: StageError) -> ErrorsByStage {
+        ErrorsByStage { with_causes: own, ..self.search.errors }
     }
 
     fn without_verdict(
@@ -256,7 +267,7 @@ impl Handover<'_> {
     ) -> Estimated {
         let SearchContext { dataset, prepared, subject, options, .. } = self.search.context;
         let set_aside = &self.search.set_aside;
-        let stages = self.stages(errors);
+        let ErrorsByStage { registered, with_causes, .. } = self.errors(errors);
         Estimated {
             robot: self.robot.to_owned(),
             nominal: subject.nominal.clone(),
@@ -280,8 +291,8 @@ impl Handover<'_> {
                 .into_iter()
                 .filter(|p| p.is_of_arm())
                 .collect(),
-            registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
-            geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
+            registered: StageErrors { fitted: registered.fitted, held_out: registered.random },
+            calibrated: StageErrors { fitted: with_causes.fitted, held_out: with_causes.random },
             noise_floor_mm: self.noise_floor_mm,
             beyond_noise_mm: beyond_noise.known_mm(),
             beyond_noise_rad: None,
@@ -292,8 +303,8 @@ impl Handover<'_> {
     }
 }
 
-/// The same rows identified, with the options of the diagnosis and beside the same frames.
-fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification> {
+/// Geometry fitted to the same rows as `identify` does, with the options of the diagnosis and beside the same frames.
+fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Fitted> {
     let SearchContext { dataset, subject, options, .. } = context;
     let defaults = identify::Options::default();
     let alone = identify::Options {
@@ -305,20 +316,20 @@ fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification
         ..defaults
     };
     let share = |rows: &Dataset| split::random(rows, alone.held_out, alone.seed);
-    identify::identify(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
+    identify::fit_geometry(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
 }
 
 /// The model with `causes` under the tolerances of the arm.
 fn written(search: &Search<'_>, causes: &[Cause], discrepancy: Option<&Discrepancy>) -> Extended {
     let SearchContext { subject, options, .. } = &search.context;
-    fit_written(subject, &options.arm_tolerance, &search.extended, causes, discrepancy)
+    fit_written(subject, &options.arm_tolerance, &search.full_fit, causes, discrepancy)
 }
 
 /// The arm for compensation, with its errors. Its effects are included only if they lower the held-out error of this very model, in
 /// random folds and in blocks; causes that are not part of it do not count.
 fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Discrepancy>) -> WrittenFit {
     let of = |certain: &[bool]| {
-        let fit = written(search, &certain_causes(&search.extended, certain), discrepancy);
+        let fit = written(search, &certain_causes(&search.full_fit, certain), discrepancy);
         WrittenFit { errors: search.validation.stage(&fit), fit }
     };
     let found = of(certain);
@@ -328,10 +339,10 @@ fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Dis
         found.errors.random.rmse < than.random.rmse && found.errors.blocks.rmse < than.blocks.rmse
     };
     let arm_alone = found.fit.causes.iter().all(of_the_arm);
-    if !found.fit.causes.iter().any(of_the_arm) || arm_alone && better(&search.stages[1]) {
+    if !found.fit.causes.iter().any(of_the_arm) || arm_alone && better(&search.errors.geometric) {
         return found;
     }
-    let causes = &search.extended.causes;
+    let causes = &search.full_fit.causes;
     let without: Vec<bool> =
         certain.iter().zip(causes).map(|(sure, cause)| *sure && !is_carried(cause)).collect();
     let plain = of(&without);
@@ -369,7 +380,7 @@ fn with_uncertain_causes(
     fit: &Extended,
     discrepancy: Option<&Discrepancy>,
 ) -> Option<Extended> {
-    let all = in_doubt::representable_causes(&search.extended.causes, &search.accepted);
+    let all = in_doubt::representable_causes(&search.full_fit.causes, &search.accepted);
     let missing = |cause: &Cause| !contains_cause(&fit.causes, cause);
     all.iter().any(missing).then(|| in_doubt::with_zero_causes(fit, written(search, &all, discrepancy)))
 }
@@ -381,9 +392,9 @@ struct Judged<'a> {
     benefit: Result<&'a Benefit, &'a NoBenefit>,
     sensor: Sensor,
     /// That the poses do not show the target's place on the flange.
-    unseen_target: Option<String>,
+    unseen_target: Option<Reason>,
     /// Errors of the data sheet, of geometry, and of the fit.
-    stages: [StageError; 3],
+    errors: ErrorsByStage,
     /// How many rows were set aside, of how many.
     set_aside: (usize, usize),
     options: &'a Options,
@@ -397,16 +408,18 @@ pub(super) fn too_many_aside(aside: usize, rows: usize) -> bool {
 /// The verdict of an identification, plus: a third of the rows must not be set aside, and findings must not raise the held-out error of geometry.
 fn judge(case: &Judged<'_>) -> Verdict {
     let mut verdict = VerdictBuilder::default();
-    let stages = &case.stages;
+    let ErrorsByStage { registered, geometric, with_causes } = &case.errors;
     if case.fitted.termination().is_converged() {
-        verdict.note(CONVERGED);
+        verdict.note(Reason::new(ReasonKind::Converged, "the fit converged"));
     } else {
         verdict.fail(format!("the fit did not converge: {}", case.fitted.termination()));
     }
-    if stages[2].blocks.rmse > stages[1].blocks.rmse * 1.05 && stages[2].random.rmse > stages[1].random.rmse {
+    if with_causes.blocks.rmse > geometric.blocks.rmse * 1.05
+        && with_causes.random.rmse > geometric.random.rmse
+    {
         verdict.fail(format!(
             "the held-out error is {:.3} mm with the findings, but {:.3} mm with geometry alone",
-            stages[2].random.rmse, stages[1].random.rmse
+            with_causes.random.rmse, geometric.random.rmse
         ));
     }
     let (aside, rows) = case.set_aside;
@@ -417,11 +430,11 @@ fn judge(case: &Judged<'_>) -> Verdict {
         ));
     }
     verdict.check_links(case.parameters, &case.options.arm_tolerance, LINK_Z);
-    verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
+    verdict.check_held_out(registered.random.rmse, with_causes.random.rmse);
     verdict.check_benefit(case.benefit, case.sensor);
     if let Some(unseen_target) = &case.unseen_target {
-        verdict.note(unseen_target.as_str());
+        verdict.note(unseen_target.clone());
     }
-    verdict.check_limits(&case.options.limits, &stages[2].random);
+    verdict.check_limits(&case.options.limits, &with_causes.random);
     verdict.build()
 }

@@ -31,11 +31,11 @@ impl FindingBuilder<'_> {
         let links = table.iter().zip(&self.extended.parameters).filter_map(|(link, parameter)| {
             let Parameter::Link { joint, coordinate } = *parameter else { return None };
             // The fit of all rows has parameters that the searched rows do not reach.
-            let k = self.found.parameters.iter().position(|p| p == parameter)?;
+            let k = self.fit.parameters.iter().position(|p| p == parameter)?;
             Some((link, k, joint, coordinate))
         });
         // Where the law of a sensor is not known, links explain a part of it.
-        let law = self.found.causes.iter().find(|cause| cause.is_empirical() && !cause.is_in_arm());
+        let law = self.fit.causes.iter().find(|cause| cause.is_empirical() && !cause.is_in_arm());
         let confidence = if law.is_some() { Confidence::Ambiguous } else { Confidence::Identified };
         let doubts: Vec<String> = law
             .map(|cause| {

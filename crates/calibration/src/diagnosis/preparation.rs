@@ -10,7 +10,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::halves::is_path;
 use crate::identification::fit::Observations;
-use crate::identification::rounding::{NotFused, ReadoutFusion, fuse_readout, logged_covariance};
+use crate::identification::rounding::{NotFused, ReadoutFusion};
 use crate::measurement::dataset::{Dataset, Motion};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
@@ -92,21 +92,12 @@ pub fn prepare(dataset: &Dataset, nominal: &Model, fuse: bool) -> Prepared {
         }
     }
     fill_motion(&mut rows);
-    let logged = Observations { angles: logged_covariance(&rows), dataset: rows.clone() };
-    let good: Vec<usize> =
-        (0..rows.rows.len()).filter(|i| mismatch.rows.iter().all(|(m, _)| m != i)).collect();
-    let mut kept = rows.subset(&good);
-    let fused = if fuse { fuse_readout(&mut kept, nominal) } else { Err(NotFused::Nothing) };
-    let (observed, readout_fusion) = match fused {
-        Ok((report, covariances)) => {
-            let mut observed = logged.clone();
-            for ((&i, row), covariance) in good.iter().zip(&kept.rows).zip(covariances) {
-                observed.dataset.rows[i].joints = row.joints;
-                observed.angles.set(i, covariance);
-            }
-            (observed, Ok(report))
-        }
-        Err(why) => (logged.clone(), Err(why)),
+    let logged = Observations::logged(rows.clone());
+    let mismatching: Vec<usize> = mismatch.rows.iter().map(|(row, _)| *row).collect();
+    let (observed, readout_fusion) = if fuse {
+        Observations::fused(rows, nominal, &mismatching)
+    } else {
+        (logged.clone(), Err(NotFused::Nothing))
     };
     Prepared { observed, logged, readout_fusion, mismatch, sides_from_order: silent }
 }

@@ -12,7 +12,7 @@ use super::options::Options;
 use super::preparation::Prepared;
 use super::residual_tests::{self, Structure};
 use super::selection::{self, Accepted, Selection};
-use super::validation::{StageError, Validation};
+use super::validation::{ErrorsByStage, StageError, Validation};
 use crate::identification::network::with_network;
 use crate::identification::rounded_log::{Asked, spent};
 use crate::measurement::dataset::Dataset;
@@ -51,9 +51,9 @@ pub(super) struct Search<'a> {
     pub(super) registered: Extended,
     pub(super) geometric: Extended,
     /// All causes, fitted to all rows.
-    pub(super) extended: Extended,
+    pub(super) full_fit: Extended,
     /// All causes, fitted to the searched rows.
-    pub(super) found: Extended,
+    pub(super) searched_fit: Extended,
     pub(super) accepted: Vec<Accepted>,
     /// All other candidates, scored against the extended model.
     pub(super) left: Vec<Scored>,
@@ -62,8 +62,7 @@ pub(super) struct Search<'a> {
     pub(super) outliers: Vec<(usize, f64)>,
     pub(super) set_aside: Vec<usize>,
     pub(super) validation: Validation,
-    /// Errors of the registered data sheet, of geometry and of the extended model.
-    pub(super) stages: [StageError; 3],
+    pub(super) errors: ErrorsByStage,
     /// Serial correlation range in searched rows; 0 for independent readings.
     pub(super) correlation_range: usize,
     pub(super) notes: Vec<String>,
@@ -83,9 +82,9 @@ impl<'a> Search<'a> {
         progress("searching for causes");
         let selection =
             selection::select(searched, &selection::Options { most, ..options.selection }, progress);
-        let Selection { geometric, extended: found, accepted, left, families } = selection;
+        let Selection { geometric, extended: searched_fit, accepted, left, families } = selection;
         let mut notes = Vec::new();
-        let (geometric, extended) = if context.is_thinned() {
+        let (geometric, full_fit) = if context.is_thinned() {
             progress("fitting all rows");
             let rows = &searched.observed.dataset;
             notes.push(format!(
@@ -93,32 +92,34 @@ impl<'a> Search<'a> {
                 rows.rows.len(),
                 dataset.rows.len()
             ));
-            let causes = extend_to_last_row(&found.causes, rows, dataset);
+            let causes = extend_to_last_row(&searched_fit.causes, rows, dataset);
             (
                 fit(subject, &[], Freedom::All, Some(&geometric)),
-                fit(subject, &causes, Freedom::All, Some(&found)),
+                fit(subject, &causes, Freedom::All, Some(&searched_fit)),
             )
         } else {
-            (geometric, found.clone())
+            (geometric, searched_fit.clone())
         };
-        let outliers = residual_tests::outliers(&extended);
+        let outliers = residual_tests::outliers(&full_fit);
         let set_aside: Vec<usize> = outliers.iter().map(|(i, _)| *i).collect();
         progress("cross-validating");
         let validation = Validation::of(subject, &set_aside, options.selection.seed, options.blocks);
-        let stages = [&registered, &geometric, &extended].map(|fit| validation.stage(fit));
+        let [of_sheet, of_geometry, of_causes] =
+            [&registered, &geometric, &full_fit].map(|fit| validation.stage(fit));
+        let errors = ErrorsByStage { registered: of_sheet, geometric: of_geometry, with_causes: of_causes };
         Self {
             context,
             registered,
             geometric,
-            extended,
-            found,
+            full_fit,
+            searched_fit,
             accepted,
             left,
             families,
             outliers,
             set_aside,
             validation,
-            stages,
+            errors,
             correlation_range: 0,
             notes,
         }
@@ -128,7 +129,7 @@ impl<'a> Search<'a> {
     /// on blocks that these leave out whole parts of the workspace, in random folds. A cause is not false because a block asks it for what
     /// no other row shows.
     pub(super) fn drop_unvalidated_causes(&mut self) {
-        let [_, geometry, extended] = self.stages;
+        let ErrorsByStage { geometric: geometry, with_causes: before, .. } = self.errors;
         let extrapolates = geometry.blocks.rmse > EXTRAPOLATION * geometry.random.rmse;
         let (of, which): (fn(&StageError) -> f64, _) = if extrapolates {
             (|stage| stage.random.rmse, "in random folds")
@@ -136,20 +137,20 @@ impl<'a> Search<'a> {
             (|stage| stage.blocks.rmse, "on held-out blocks")
         };
         let mut dropped = Vec::new();
-        while of(&self.stages[2]) > of(&geometry)
+        while of(&self.errors.with_causes) > of(&geometry)
             && let Some(weakest) = self.weakest()
         {
-            dropped.push(short_name(&self.found.causes[weakest]));
+            dropped.push(short_name(&self.searched_fit.causes[weakest]));
             self.accepted.remove(weakest);
-            let extended = self.without(&[weakest]);
-            self.replace_fit(extended, &[weakest]);
-            self.stages[2] = self.validation.stage(&self.extended);
+            let without = self.without(&[weakest]);
+            self.replace_fit(without, &[weakest]);
+            self.errors.with_causes = self.validation.stage(&self.full_fit);
         }
         if !dropped.is_empty() {
             self.notes.push(format!(
                 "dropped, since with {} the error {which} was {:.4} mm, with geometry alone {:.4} mm: {}",
                 if dropped.len() == 1 { "it" } else { "them" },
-                of(&extended),
+                of(&before),
                 of(&geometry),
                 dropped.join(", ")
             ));
@@ -159,33 +160,33 @@ impl<'a> Search<'a> {
     /// The accepted cause with the least merit, except shifts.
     fn weakest(&self) -> Option<usize> {
         (0..self.accepted.len())
-            .filter(|&k| self.found.causes[k].rows().is_none())
+            .filter(|&k| self.searched_fit.causes[k].rows().is_none())
             .min_by(|&a, &b| self.accepted[a].own.merit.total_cmp(&self.accepted[b].own.merit))
     }
 
     /// The fit to all rows without some of its causes.
     fn without(&self, dropped: &[usize]) -> Extended {
-        without(&self.context.subject, &self.extended, dropped)
+        without(&self.context.subject, &self.full_fit, dropped)
     }
 
     /// Continues with a fit without some causes.
-    fn replace_fit(&mut self, extended: Extended, dropped: &[usize]) {
-        self.found = if self.context.is_thinned() {
-            without(&self.context.searched, &self.found, dropped)
+    fn replace_fit(&mut self, full_fit: Extended, dropped: &[usize]) {
+        self.searched_fit = if self.context.is_thinned() {
+            without(&self.context.searched, &self.searched_fit, dropped)
         } else {
-            extended.clone()
+            full_fit.clone()
         };
-        self.extended = extended;
+        self.full_fit = full_fit;
     }
 
     /// Confirms the causes by stability selection, and estimates the discrepancy.
     pub(super) fn confirm(&self) -> Confirmed {
         let SearchContext { searched, prepared, options, .. } = self.context;
-        let linear = Linear::of(searched, &self.found);
+        let linear = Linear::of(searched, &self.searched_fit);
         let whole = linear.whole();
         let confirming = ConfirmationContext {
             subject: searched,
-            found: &self.found,
+            fit: &self.searched_fit,
             linear: &linear,
             accepted: &self.accepted,
             pool: &self.left,
@@ -213,21 +214,22 @@ impl<'a> Search<'a> {
         let seed = options.selection.seed;
         self.validation = Validation::in_order(subject, &self.set_aside, seed, options.blocks, reach);
         let stage = |fit: &Extended| self.validation.stage(fit);
-        let passing: Vec<usize> = (0..self.found.causes.len())
+        let passing: Vec<usize> = (0..self.searched_fit.causes.len())
             .filter(|&k| {
-                self.found.causes[k].rows().is_some() && !confirmed.outcome.confirmations[k].is_confirmed()
+                self.searched_fit.causes[k].rows().is_some()
+                    && !confirmed.outcome.confirmations[k].is_confirmed()
             })
             .collect();
-        let [before, geometry] = [&self.registered, &self.geometric].map(stage);
+        let [registered, geometric] = [&self.registered, &self.geometric].map(stage);
         // Whatever the held-out error is: their rows were selected for it.
         let excursions = confirmed.outcome.discrepancy.correlation > CORRELATED_NOISE;
-        let kept = || stage(&self.extended);
+        let kept = || stage(&self.full_fit);
         let lasting = (!passing.is_empty()).then(|| {
             let fit = self.without(&passing);
             let errors = stage(&fit);
             (fit, errors)
         });
-        let (lasting, extended) = match lasting {
+        let (lasting, with_causes) = match lasting {
             None => (None, kept()),
             Some((fit, errors)) if excursions => (Some(fit), errors),
             Some((fit, errors)) => {
@@ -236,7 +238,7 @@ impl<'a> Search<'a> {
                 if generalises { (Some(fit), errors) } else { (None, whole) }
             }
         };
-        self.stages = [before, geometry, extended];
+        self.errors = ErrorsByStage { registered, geometric, with_causes };
         if let Some(fit) = lasting {
             self.replace_fit(fit, &passing);
             let mut place = 0..;
@@ -269,12 +271,12 @@ impl<'a> Search<'a> {
             return None;
         }
         progress("fitting a smooth correction to the residual");
-        let smooth = smooth_correction(subject, &self.extended);
+        let smooth = smooth_correction(subject, &self.full_fit);
         let stage = self.validation.stage(&smooth);
-        let before = &self.stages[2];
+        let before = &self.errors.with_causes;
         if stage.random.rmse < before.random.rmse && stage.blocks.rmse < before.blocks.rmse {
             let without = before.random.rmse;
-            (self.extended, self.stages[2]) = (smooth, stage);
+            (self.full_fit, self.errors.with_causes) = (smooth, stage);
             return Some(without);
         }
         self.notes.push(format!(

@@ -52,14 +52,14 @@ pub(super) fn summarise(
 ) -> Summary {
     let context = search.context;
     let (subject, searched, prepared) = (&context.subject, &context.searched, context.prepared);
-    let (stages, outcome) = (&search.stages, &confirmed.outcome);
+    let (errors, outcome) = (&search.errors, &confirmed.outcome);
     let floor = noise_floor::noise_floor_beside_shift(&without_outliers(search)).filter(NoiseFloor::is_known);
     let mut steps = vec![
-        Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
-        Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
+        Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: errors.registered.random.rmse },
+        Step { added: "geometry".to_owned(), cv_rmse_mm: errors.geometric.random.rmse },
     ];
-    let extended = search.extended.clone().whole(subject);
-    let contributions = Contributions::new(searched, &search.found, &confirmed.whole);
+    let extended = search.full_fit.clone().whole(subject);
+    let contributions = Contributions::new(searched, &search.searched_fit, &confirmed.whole);
     let Findings { of_causes, finding_of_cause, pictures, of_links } =
         findings(search, confirmed, &extended, &contributions, &mut steps);
     let confounding = confounding(search, confirmed, &contributions, floor.as_ref());
@@ -68,20 +68,21 @@ pub(super) fn summarise(
         &outcome.confirmations,
         &outcome.discrepancy,
         &confounding,
-        stages[1].fitted.rmse,
+        errors.geometric.fitted.rmse,
     );
     if smoothed.is_some() {
         let added = "smooth correction, without a physical cause".to_owned();
-        steps.push(Step { added, cv_rmse_mm: stages[2].random.rmse });
+        steps.push(Step { added, cv_rmse_mm: errors.with_causes.random.rmse });
     }
     (context.progress)("analysing the residual");
-    let noise_floor = noise_floor(&floor, subject, &search.extended);
-    let aside: Vec<usize> = residual_tests::outliers(&search.found).into_iter().map(|(row, _)| row).collect();
+    let noise_floor = noise_floor(&floor, subject, &search.full_fit);
+    let aside: Vec<usize> =
+        residual_tests::outliers(&search.searched_fit).into_iter().map(|(row, _)| row).collect();
     let logged_rad = searched.observed.angles.typical_rad();
-    let scatter = JointScatter::of(&confirmed.linear, &search.found.robust_weight, &aside, logged_rad);
+    let scatter = JointScatter::of(&confirmed.linear, &search.searched_fit.robust_weight, &aside, logged_rad);
     let rounding = rounding_beside_causes(search, floor.as_ref());
     let rounding_finding =
-        rounding_finding(context.dataset, prepared, subject, &search.geometric, (stages, few_poses))
+        rounding_finding(context.dataset, prepared, subject, &search.geometric, (errors, few_poses))
             .filter(|_| rounding != Rounding::Exact);
     // Of repeated poses the scatter has no rounding.
     let rounding_mm = rounding_finding.as_ref().filter(|_| floor.is_some()).and_then(|f| f.worth_mm);
@@ -90,21 +91,21 @@ pub(super) fn summarise(
         discrepancy: &outcome.discrepancy,
         scatter: scatter.as_ref(),
         structure,
-        after: &stages[2],
+        after: &errors.with_causes,
         smoothed,
         floor_mm: noise_floor.0.map(|floor_mm| floor_mm.hypot(rounding_mm.unwrap_or(0.0))),
         noise_measured: floor.is_some(),
     };
     let outliers = unexpected_outliers(search);
-    let off = Deviation::of(&search.extended, &outliers);
+    let off = Deviation::of(&search.full_fit, &outliers);
     let empirical_mm = confounding.largest_empirical_rms_mm();
     let unexplained_finding = unexplained.finding();
     let something_else =
         unexplained_finding.is_some().then(|| something_else(&searched.observed.dataset, confirmed));
     let of_the_record = [
         rounding_finding,
-        mismatch_finding(context.dataset, prepared, &stages[2]),
-        outlier_finding(context.dataset, &outliers, (off, empirical_mm), &stages[2]),
+        mismatch_finding(context.dataset, prepared, &errors.with_causes),
+        outlier_finding(context.dataset, &outliers, (off, empirical_mm), &errors.with_causes),
         unexplained_finding,
     ];
     let without_causes = of_the_record.into_iter().flatten().chain(of_links);
@@ -129,7 +130,7 @@ pub(super) fn summarise(
 /// What the residuals say of the rounding of the angles: those of the model with all causes, or of geometry alone where these leave it open.
 /// Causes that were found in the scatter of a rounded log take up a part of it.
 fn rounding_beside_causes(search: &Search<'_>, repeats: Option<&NoiseFloor>) -> Rounding {
-    let asked = search.asked_of_rounding(&search.extended, repeats);
+    let asked = search.asked_of_rounding(&search.full_fit, repeats);
     let of_geometry = || search.asked_of_rounding(&search.geometric, repeats).rounding();
     match asked.rounding() {
         Rounding::Undecided if matches!(of_geometry(), Rounding::Rounded(_)) => {
@@ -149,7 +150,7 @@ fn confounding<'s>(
     let (context, outcome) = (search.context, &confirmed.outcome);
     let subject = &context.subject;
     Confounding {
-        causes: &search.found.causes,
+        causes: &search.searched_fit.causes,
         confirmations: &outcome.confirmations,
         contributions,
         nominal: subject.nominal,
@@ -158,14 +159,18 @@ fn confounding<'s>(
         field_mm: outcome.discrepancy.field_mm(),
         excess_over_noise_mm: floor.map_or(0.0, |floor| {
             let coordinates = context.dataset.sensor.axes();
-            excess_over_noise_mm(search.stages[2].fitted.rmse, floor.sigma_mm, coordinates * floor.freedom)
+            excess_over_noise_mm(
+                search.errors.with_causes.fitted.rmse,
+                floor.sigma_mm,
+                coordinates * floor.freedom,
+            )
         }),
     }
 }
 
 /// The outliers, without those that a fault found from the motion cannot explain because nothing is known of theirs: the first row.
 fn unexpected_outliers(search: &Search<'_>) -> Vec<(usize, f64)> {
-    let kinds = || search.found.causes.iter().map(|cause| cause.kind());
+    let kinds = || search.searched_fit.causes.iter().map(|cause| cause.kind());
     let rows = &search.context.subject.observed.dataset.rows;
     let follows_motion = kinds().any(|kind| matches!(kind, CauseKind::Latency | CauseKind::Unsettled));
     let is_expected = |row: usize| follows_motion && rows[row].motion().is_none();
@@ -205,7 +210,7 @@ fn findings(
     let aside: &[usize] = if context.is_thinned() { &[] } else { &search.set_aside };
     let builder = FindingBuilder {
         subject: &context.searched,
-        found: &search.found,
+        fit: &search.searched_fit,
         extended,
         whole: &confirmed.whole,
         held: &FoldErrors::of(&confirmed.linear, &folds),

@@ -197,7 +197,7 @@ impl Diagnosed {
             return Some(Foreign::NotThisArm);
         }
         let estimated = &self.estimated;
-        let held_out_mm = estimated.geometry.held_out.rmse / per_axis(estimated.provenance.sensor);
+        let held_out_mm = estimated.calibrated.held_out.rmse / per_axis(estimated.provenance.sensor);
         if !(left_mm > FOREIGN_MM && left_mm > FOREIGN_IF_CHANGED * held_out_mm) {
             return None;
         }
@@ -254,13 +254,13 @@ impl Diagnosed {
             if verdict.status != Judgement::Fail {
                 verdict.status = if surely { Judgement::Fail } else { Judgement::Doubtful };
             }
-            verdict.reasons.insert(0, format!("{compared}: `identify` writes geometry alone"));
+            verdict.reasons.insert(0, format!("{compared}: `identify` writes geometry alone").into());
         } else if let Some(foreign) = foreign {
             let status = if foreign.fails() { Judgement::Fail } else { Judgement::Doubtful };
             if verdict.status != Judgement::Fail {
                 verdict.status = status;
             }
-            let held_out_mm = self.estimated.geometry.held_out.rmse;
+            let held_out_mm = self.estimated.calibrated.held_out.rmse;
             verdict.reasons.insert(
                 0,
                 format!(
@@ -268,10 +268,11 @@ impl Diagnosed {
                      while the held-out error here is {held_out_mm:.3} mm: {}",
                     tested.file,
                     foreign.says()
-                ),
+                )
+                .into(),
             );
         } else {
-            verdict.reasons.push(compared);
+            verdict.reasons.push(compared.into());
         }
         self.diagnosis.verdict = Some(verdict.clone());
         self.diagnosis.transfers.push(tested);

@@ -31,6 +31,17 @@ pub struct StageError {
     pub blocks: ErrorSummary,
 }
 
+/// Errors of the stages of a diagnosis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ErrorsByStage {
+    /// Of the data sheet with registered frames.
+    pub(super) registered: StageError,
+    /// Of geometry alone.
+    pub(super) geometric: StageError,
+    /// Of the fit with causes: with all of them, or, of a written arm, with its own.
+    pub(super) with_causes: StageError,
+}
+
 /// Scalar rows times squared parameters from which a fold is refitted by one step.
 const MUCH_WORK: f64 = 1e9;
 

@@ -15,7 +15,9 @@
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::identifiability::{Identifiability, identifiability};
 use crate::identification::prior_width::learn_tolerance;
-use crate::identification::rounding::{self, AngleCovariance};
+use crate::identification::rounding::{
+    self, AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance,
+};
 use crate::identification::solver::Solver;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
@@ -59,6 +61,32 @@ pub struct Observations {
 }
 
 impl Observations {
+    /// Rows with their angles as logged.
+    pub fn logged(dataset: Dataset) -> Self {
+        Self { angles: logged_covariance(&dataset), dataset }
+    }
+
+    /// Rows with the controller's read-out fused into their rounded angles, or as logged, with the reason; those at `excluded` stay as logged.
+    pub fn fused(
+        dataset: Dataset,
+        nominal: &Model,
+        excluded: &[usize],
+    ) -> (Self, Result<ReadoutFusion, NotFused>) {
+        let fused: Vec<usize> = (0..dataset.rows.len()).filter(|row| !excluded.contains(row)).collect();
+        let mut rows = dataset.subset(&fused);
+        let mut observed = Self::logged(dataset);
+        match fuse_readout(&mut rows, nominal) {
+            Ok((report, covariances)) => {
+                for ((&i, row), covariance) in fused.iter().zip(&rows.rows).zip(covariances) {
+                    observed.dataset.rows[i].joints = row.joints;
+                    observed.angles.set(i, covariance);
+                }
+                (observed, Ok(report))
+            }
+            Err(why) => (observed, Err(why)),
+        }
+    }
+
     /// The rows at `indices`.
     pub fn subset(&self, indices: &[usize]) -> Self {
         Self { dataset: self.dataset.subset(indices), angles: self.angles.subset(indices) }

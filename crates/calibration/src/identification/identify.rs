@@ -20,22 +20,21 @@ use crate::identification::parameter_table::parameter_table;
 use crate::identification::prior_width::width_uncertainty;
 use crate::identification::repeats::Repeats;
 use crate::identification::rounded_log::{Asked, Rounding, spent};
-use crate::identification::rounding::{
-    AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance, rounding_floor_mm,
-};
+use crate::identification::rounding::{NotFused, ReadoutFusion, rounding_floor_mm};
 use crate::identification::sessions::set_up_anew;
 use crate::identification::solver::{Family, SOLVERS, Scope, Solver};
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::identification::unseen_target::unseen_target;
-use crate::identification::verdict::{CONVERGED, Limits, NOT_NOISE, VerdictBuilder};
+use crate::identification::verdict::{Limits, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::{self, NoiseFloor};
 use crate::measurement::split::Split;
 use crate::measurement::stations::without_frames;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{
-    Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict, WidthUncertainty,
+    Estimated, EstimatedParameter, Judgement, Provenance, Reason, ReasonKind, StageErrors, Verdict,
+    WidthUncertainty,
 };
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{Parameter, arm_parameters, link_parameters};
@@ -195,19 +194,8 @@ pub fn identify(
     let sensing = frame_parameters(&observed.dataset);
     let everything = options.solver.parameters(nominal, &sensing);
     let stages = Stages { nominal, frames, sensing: &sensing, everything: &everything, options };
-    let wrong_arm = |found| {
-        let (file, robot) = (dataset.file.clone(), robot.to_owned());
-        match found {
-            WrongArm::Position { rmse_mm } => {
-                let explanation = misreading::explanation(dataset, nominal);
-                IdentifyError::WrongArm { file, robot, rmse_mm, explanation }
-            }
-            WrongArm::Orientation { rad } => {
-                IdentifyError::WrongOrientation { file, robot, deg: rad.to_degrees() }
-            }
-        }
-    };
-    let trained = fit_training_rows(&stages, &fitted_rows, &held_rows).map_err(wrong_arm)?;
+    let trained = fit_training_rows(&stages, &fitted_rows, &held_rows)
+        .map_err(|found| found.error(dataset, robot, nominal))?;
     // A method as printed has no priors, of which a benefit is made.
     let variance_inflation =
         (!options.solver.as_printed).then(|| inflation_from_rows(&trained.training, &held_rows));
@@ -215,10 +203,7 @@ pub fn identify(
     // The final model, from all rows.
     report_step("fitting all rows");
     let registered = stages.registered(&observed);
-    let mut geometry = stages.geometry(&observed, &registered);
-    if let Some(sigma) = options.tolerance.scale {
-        widen_by_scale(&mut geometry, &observed.dataset, sigma);
-    }
+    let geometry = stages.widened_geometry(&observed, &registered);
     let raw = options.stated_frames.as_ref().map(|f| summary_on(&observed, nominal, f));
     let square_mm2 = mean_square_of(&trained.geometry, geometry.parameters.len(), observed.dataset.sensor);
     let repeats = scatter.map(|floor| Repeats::of(floor, &observed.dataset, &geometry, square_mm2));
@@ -235,7 +220,7 @@ pub fn identify(
         provenance: Provenance { sharpened, ..provenance(dataset, &observed, &outliers, options) },
         parameters: select_arm_parameters(&parameters),
         registered: trained.registered,
-        geometry: trained.geometry,
+        calibrated: trained.geometry,
         noise_floor_mm: noise_floor(repeats.as_ref(), &observed, &geometry),
         beyond_noise_mm: None,
         beyond_noise_rad: None,
@@ -303,6 +288,33 @@ pub fn identify(
     })
 }
 
+/// The fit of geometry to all rows that [`identify`] writes, without what states its error: no row is held out.
+///
+/// `split` are the rows on which [`identify`] judges whether the readings are of this arm.
+///
+/// # Errors
+/// Those of [`identify`].
+pub(crate) fn fit_geometry(
+    dataset: &Dataset,
+    robot: &str,
+    nominal: &Model,
+    frames: &Frames,
+    split: &dyn Fn(&Dataset) -> Split,
+    options: &Options,
+) -> Result<Fitted, IdentifyError> {
+    let (observed, ..) = observations_without_outliers(dataset, nominal, frames, options)?;
+    let prepared = options.solver.prepare_model(nominal, dataset);
+    let nominal = &prepared;
+    let sensing = frame_parameters(&observed.dataset);
+    let everything = options.solver.parameters(nominal, &sensing);
+    let stages = Stages { nominal, frames, sensing: &sensing, everything: &everything, options };
+    let training = observed.subset(&split(&observed.dataset).train);
+    stages.registered_own(&training).map_err(|found| found.error(dataset, robot, nominal))?;
+    report_step("fitting all rows");
+    let registered = stages.registered(&observed);
+    Ok(stages.widened_geometry(&observed, &registered))
+}
+
 /// The rows as they are fitted, without outliers, which are the same for every method.
 fn observations_without_outliers(
     dataset: &Dataset,
@@ -349,6 +361,22 @@ enum WrongArm {
     Orientation { rad: f64 },
 }
 
+impl WrongArm {
+    /// The error, with what else the readings may be.
+    fn error(self, dataset: &Dataset, robot: &str, nominal: &Model) -> IdentifyError {
+        let (file, robot) = (dataset.file.clone(), robot.to_owned());
+        match self {
+            WrongArm::Position { rmse_mm } => {
+                let explanation = misreading::explanation(dataset, nominal);
+                IdentifyError::WrongArm { file, robot, rmse_mm, explanation }
+            }
+            WrongArm::Orientation { rad } => {
+                IdentifyError::WrongOrientation { file, robot, deg: rad.to_degrees() }
+            }
+        }
+    }
+}
+
 /// Fits the training rows and evaluates the held-out ones.
 fn fit_training_rows(
     stages: &Stages<'_>,
@@ -356,15 +384,7 @@ fn fit_training_rows(
     held: &Observations,
 ) -> Result<Trained, WrongArm> {
     report_step("fitting the training rows");
-    let registered = stages.registered(rows);
-    let rmse_mm = summary_on(rows, &registered.model, &registered.frames).rmse;
-    if !(rmse_mm < OTHER_ARM_MM) {
-        return Err(WrongArm::Position { rmse_mm });
-    }
-    let turned = median_orientation_error(rows, &registered.model, &registered.frames);
-    if let Some(rad) = turned.filter(|rad| *rad > WRONG_ORIENTATION_RAD) {
-        return Err(WrongArm::Orientation { rad });
-    }
+    let registered = stages.registered_own(rows)?;
     let on = |fitted: &Fitted| {
         let errors = errors_on(held, &fitted.model, &fitted.frames);
         let counted = without_frames(&rows.dataset, &held.dataset, errors.clone());
@@ -442,6 +462,29 @@ impl Stages<'_> {
         fitted
     }
 
+    /// The same, if the readings are of this arm.
+    fn registered_own(&self, rows: &Observations) -> Result<Fitted, WrongArm> {
+        let registered = self.registered(rows);
+        let rmse_mm = summary_on(rows, &registered.model, &registered.frames).rmse;
+        if !(rmse_mm < OTHER_ARM_MM) {
+            return Err(WrongArm::Position { rmse_mm });
+        }
+        let turned = median_orientation_error(rows, &registered.model, &registered.frames);
+        match turned.filter(|rad| *rad > WRONG_ORIENTATION_RAD) {
+            Some(rad) => Err(WrongArm::Orientation { rad }),
+            None => Ok(registered),
+        }
+    }
+
+    /// Fits the links too, with the stated uncertainty of the sensor's scale.
+    fn widened_geometry(&self, rows: &Observations, registered: &Fitted) -> Fitted {
+        let mut geometry = self.geometry(rows, registered);
+        if let Some(sigma) = self.options.tolerance.scale {
+            widen_by_scale(&mut geometry, &rows.dataset, sigma);
+        }
+        geometry
+    }
+
     /// Fits the links too. Methods as printed fit frames first, then links without priors.
     fn geometry(&self, rows: &Observations, registered: &Fitted) -> Fitted {
         let Options { solver, tolerance, seed, .. } = self.options;
@@ -472,15 +515,10 @@ pub fn prepare_observations(
     nominal: &Model,
     fuse: bool,
 ) -> (Observations, Result<ReadoutFusion, NotFused>) {
-    let mut rows = dataset.clone();
-    match if fuse { fuse_readout(&mut rows, nominal) } else { Err(NotFused::Nothing) } {
-        Ok((report, angles)) => {
-            (Observations { dataset: rows, angles: AngleCovariance::each(angles) }, Ok(report))
-        }
-        Err(reason) => {
-            let angles = logged_covariance(dataset);
-            (Observations { dataset: rows, angles }, Err(reason))
-        }
+    if fuse {
+        Observations::fused(dataset.clone(), nominal, &[])
+    } else {
+        (Observations::logged(dataset.clone()), Err(NotFused::Nothing))
     }
 }
 
@@ -612,7 +650,7 @@ struct VerdictInputs<'a> {
     /// What speaks against one frame for all sessions.
     set_up_anew: Option<String>,
     /// That the poses do not show the target's place on the flange.
-    unseen_target: Option<String>,
+    unseen_target: Option<Reason>,
     /// What repeated poses show beside the noise of a reading.
     repeats: Option<&'a str>,
     /// What errors beyond the noise make of a tool that is longer than the target is far from the flange.
@@ -645,7 +683,7 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
         let filtered =
             options.solver.family == Family::Filter && fitted.termination() == Termination::DataProcessed;
         if fitted.termination().is_converged() {
-            verdict.note(format!("on {rows} {CONVERGED}"));
+            verdict.note(Reason::new(ReasonKind::Converged, format!("on {rows} the fit converged")));
         } else if filtered {
             verdict.note(format!(
                 "on {rows} the filter processed every reading; it does not test for a minimum"
@@ -681,13 +719,14 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
         ));
     }
     if let Some(unseen_target) = &case.unseen_target {
-        verdict.note(unseen_target.as_str());
+        verdict.note(unseen_target.clone());
     }
     if let Some(pattern) = case.repeats {
-        verdict.note(format!(
-            "{NOT_NOISE}: {pattern}. The expected error does not treat this as sensor noise; `diagnose` looks for the cause and fits a model \
+        let text = format!(
+            "repeated poses differ by more than the noise of a reading: {pattern}. The expected error does not treat this as sensor noise; `diagnose` looks for the cause and fits a model \
              without it"
-        ));
+        );
+        verdict.note(Reason::new(ReasonKind::MoreThanNoise, text));
     }
     if let Some(longer_tool) = &case.longer_tool {
         verdict.note(longer_tool.as_str());

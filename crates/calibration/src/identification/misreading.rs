@@ -8,7 +8,6 @@ use nalgebra::Vector3;
 use super::calibration::{CalibrationProblem, Frames, Weight};
 use super::start::candidate_frames;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
-use crate::measurement::import::join_by_time::JOINED_BY_TIME;
 use truegrind_arm::model::Model;
 use truegrind_math::sentence::listed;
 use truegrind_math::statistics::median;
@@ -143,7 +142,7 @@ impl Case<'_> {
             let off = own_mm[..before].iter().filter(|mm| !good(mm)).count();
             let number = self.dataset.rows[source(first)?].number;
             (off <= before / 10).then(|| {
-                let clocks = if self.is_joined_by_time() { CLOCKS_DIFFER } else { "" };
+                let clocks = if self.dataset.joined_by_time { CLOCKS_DIFFER } else { "" };
                 if step > 0 {
                     format!("from row {number} on each reading belongs to the row after it: a reading is missing there{clocks}")
                 } else {
@@ -151,11 +150,6 @@ impl Case<'_> {
                 }
             })
         })
-    }
-
-    /// Whether the points of a tracker were joined by their times: then clocks that differ shift them.
-    fn is_joined_by_time(&self) -> bool {
-        self.dataset.notes.iter().any(|note| note.contains(JOINED_BY_TIME))
     }
 
     /// The rows with other readings; those without one are left out.

@@ -26,11 +26,6 @@ pub struct AngleCovariance {
 }
 
 impl AngleCovariance {
-    /// One covariance for each row.
-    pub fn each(own: Vec<Matrix6<f64>>) -> Self {
-        Self { rows: own.len(), common: Matrix6::zeros(), own }
-    }
-
     /// Covariance of row `i`.
     pub fn of(&self, i: usize) -> &Matrix6<f64> {
         self.own.get(i).unwrap_or(&self.common)

@@ -57,7 +57,7 @@ pub struct Solver {
     pub family: Family,
     /// Scope of the network; `None` without a network.
     pub network: Option<Scope>,
-    run: fn(&dyn Problem, &[f64], u64) -> Estimate,
+    run: fn(&dyn Problem, &[f64], u64, StepLimit) -> Estimate,
     configure: fn(&toml::Table) -> Result<ConfiguredSolver, String>,
 }
 
@@ -97,11 +97,11 @@ pub struct ConfiguredSolver {
 impl Solver {
     /// Minimises the cost of `problem` from `start`.
     pub fn solve(&self, problem: &dyn Problem, start: &[f64], seed: u64) -> Estimate {
-        (self.run)(problem, start, seed)
+        (self.run)(problem, start, seed, None)
     }
 
     /// As [`Solver::solve`], with at most `most_iterations` trial steps if the method has the setting `max-iterations`; never
-    /// more than its default.
+    /// more than its own.
     pub fn solve_within(
         &self,
         problem: &dyn Problem,
@@ -109,17 +109,7 @@ impl Solver {
         seed: u64,
         most_iterations: usize,
     ) -> Estimate {
-        const KEY: &str = "max-iterations";
-        let own = self.configured(&toml::Table::new()).ok();
-        let own = own.and_then(|method| method.settings.get(KEY)?.as_integer());
-        if own.is_none_or(|own| own <= most_iterations as i64) {
-            return self.solve(problem, start, seed);
-        }
-        let fewer = toml::Table::from_iter([(KEY.to_owned(), toml::Value::Integer(most_iterations as i64))]);
-        match self.configured(&fewer) {
-            Ok(method) => (method.run)(problem, start, seed),
-            Err(_) => self.solve(problem, start, seed),
-        }
+        (self.run)(problem, start, seed, Some(most_iterations))
     }
 
     /// The method with `changes` to its settings (the fields of its `Options`, in kebab-case).
@@ -189,6 +179,34 @@ fn merge(into: &mut toml::Table, changes: &toml::Table) {
     }
 }
 
+/// Largest number of trial steps; `None` for that of the method.
+type StepLimit = Option<usize>;
+
+/// Options of a method that may limit its trial steps.
+trait LimitSteps {
+    fn limit_steps(&mut self, _limit: StepLimit) {}
+}
+
+macro_rules! limited {
+    ($($module:ident),*) => {
+        $(impl LimitSteps for $module::Options {
+            fn limit_steps(&mut self, limit: StepLimit) {
+                self.max_iterations = limit.map_or(self.max_iterations, |most| self.max_iterations.min(most));
+            }
+        })*
+    };
+}
+
+// `qibas` has the options of `bas`.
+limited!(lm, ltlm, sslm, vslm, gauss_newton, pso, de, sca, bas);
+
+impl LimitSteps for ekf::Options {}
+impl LimitSteps for ukf::Options {}
+impl LimitSteps for ukf_vslm::Options {}
+impl LimitSteps for pf::Options {}
+impl LimitSteps for rls::Options {}
+impl LimitSteps for rbf::Options {}
+
 /// An entry of the registry; its module provides `Options` and `solve`.
 macro_rules! method {
     ($name:literal, $about:literal, $family:ident, $as_printed:literal, $network:expr, $module:ident, $options:expr) => {
@@ -198,9 +216,10 @@ macro_rules! method {
             as_printed: $as_printed,
             family: Family::$family,
             network: $network,
-            run: |problem, start, seed| {
+            run: |problem, start, seed, limit| {
                 let mut options: $module::Options = $options;
                 options.seed = seed;
+                options.limit_steps(limit);
                 $module::solve(problem, start, &options)
             },
             configure: |changes| {
@@ -265,7 +284,11 @@ pub const FURTHER_SOLVERS: &[Solver] = &[
         as_printed: false,
         family: Family::Network,
         network: Some(Scope::WithLinks),
-        run: |problem, start, seed| lm::solve(problem, start, &lm::Options { seed, ..Default::default() }),
+        run: |problem, start, seed, limit| {
+            let mut options = lm::Options { seed, ..Default::default() };
+            options.limit_steps(limit);
+            lm::solve(problem, start, &options)
+        },
         configure: |changes| {
             let (options, settings) = override_options(&lm::Options::default(), changes)?;
             let run: Run = Box::new(move |problem, start, seed| {

@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector, Point3, UnitQuaternion, Vector3, Vector6};
 
 use super::calibration::Frames;
 use super::fit::{Fitted, Observations, errors_on};
-use super::identify::{Options, identify};
+use super::identify::{Options, fit_geometry};
 use super::linearised_readings::widen_by_scale;
 use super::rounding::logged_covariance;
 use super::sensor_laws::mean_reading;
@@ -174,7 +174,7 @@ fn fitted_beside(
 ) -> Option<Fitted> {
     let options = Options { tolerance, ..Options::default() };
     let split = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
-    identify(dataset, "", nominal, frames, &split, &options).ok().map(|found| found.geometry)
+    fit_geometry(dataset, "", nominal, frames, &split, &options).ok()
 }
 
 /// What speaks against the stated frame, whose standard deviation is `sigma_mm`, beside the frame `found` from the readings of the arm

@@ -57,7 +57,7 @@ pub fn study(
             Ok((
                 s,
                 result.estimated.registered.held_out,
-                result.estimated.geometry.held_out,
+                result.estimated.calibrated.held_out,
                 result.training.termination(),
                 per,
             ))

@@ -9,10 +9,9 @@
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen, UnitQuaternion};
 
 use super::fit::Fitted;
-use super::verdict::TARGET_NOT_SHOWN;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::registration;
-use truegrind_arm::estimated::Estimated;
+use truegrind_arm::estimated::{Estimated, Reason, ReasonKind};
 use truegrind_arm::jacobian::{BaseAndTool, parameter_jacobian};
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
@@ -32,9 +31,9 @@ const ONE_ORIENTATION_DEG: f64 = 5.0;
 /// Spread of orientations beside their main axis below which they turn about that axis only (°, RMS).
 const ONE_AXIS_DEG: f64 = 5.0;
 
-/// The sentence; `None` where the poses or a stated frame show the target's place, or a cable measures: its length hardly ever does.
+/// The reason; `None` where the poses or a stated frame show the target's place, or a cable measures: its length hardly ever does.
 /// `dataset` has the rows that count: none with a gross error.
-pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Estimated) -> Option<String> {
+pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Estimated) -> Option<Reason> {
     if dataset.sensor == Sensor::Cable {
         return None;
     }
@@ -68,13 +67,14 @@ pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Esti
         let scale = 10_f64.powi(decimals as i32);
         format!("{:.decimals$}", (at[k] * scale).round() / scale + 0.0)
     });
-    Some(format!(
-        "these poses, {poses}, {TARGET_NOT_SHOWN}: moving the target has the same effect on the readings as moving the sensor. Its position is \
+    let text = format!(
+        "these poses, {poses}, do not show where the target sits on the flange: moving the target has the same effect on the readings as moving the sensor. Its position is \
          taken as {x},{y},{z} mm, known only to ± {known_mm:.decimals$} mm (--touched-point and --touched-sigma state it). The errors in mm here \
          are those of the target; a tool whose tip is {TIP_MM:.0} mm from it may be off by a further {:.3} mm (1 sigma), in proportion to its \
          distance. To see it, measure two or three more poses with the flange turned by 30° or more about different axes",
         tip_mm(estimated)
-    ))
+    );
+    Some(Reason::new(ReasonKind::TargetNotShown, text))
 }
 
 /// The flange in each row, by the data sheet.

@@ -9,7 +9,7 @@ use crate::identification::benefit::{Benefit, LawError, MIN_PROBABILITY, NoBenef
 use crate::identification::sensor_laws::SensorLaw;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Sensor;
-use truegrind_arm::estimated::{EstimatedParameter, Judgement, Verdict};
+use truegrind_arm::estimated::{EstimatedParameter, Judgement, Reason, ReasonKind, Verdict};
 use truegrind_math::statistics::ErrorSummary;
 
 /// Probability from which a scale error of the sensor counts as detected.
@@ -25,24 +25,12 @@ const IMPLAUSIBLE_DEVIATION: f64 = 6.0;
 /// Most of these parameters that the verdict names.
 const NAMED: usize = 4;
 
-/// Note of a verdict without stated limits.
-pub const NO_LIMITS: &str = "held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)";
-
-/// Begin of the note that repeated poses show more than noise: what was measured moved, so that the model is used with care.
-pub const NOT_NOISE: &str = "repeated poses differ by more than the noise of a reading";
-
-/// Part of the note that the poses do not show the place of the target: headlines of reports look for it.
-pub const TARGET_NOT_SHOWN: &str = "do not show where the target sits on the flange";
-
-/// End of the note on a fit that converged.
-pub const CONVERGED: &str = "the fit converged";
-
 /// Collects the reasons for and against a model, one sentence each.
 #[derive(Debug, Clone, Default)]
 pub struct VerdictBuilder {
-    failures: Vec<String>,
-    doubts: Vec<String>,
-    others: Vec<String>,
+    failures: Vec<Reason>,
+    doubts: Vec<Reason>,
+    others: Vec<Reason>,
     /// Which of these is the expected benefit.
     benefit: Option<usize>,
     limits_stated: bool,
@@ -59,17 +47,17 @@ pub struct Limits {
 
 impl VerdictBuilder {
     /// Adds a reason for failure.
-    pub fn fail(&mut self, reason: impl Into<String>) {
+    pub fn fail(&mut self, reason: impl Into<Reason>) {
         self.failures.push(reason.into());
     }
 
     /// Adds a reason for doubt.
-    pub fn doubt(&mut self, reason: impl Into<String>) {
+    pub fn doubt(&mut self, reason: impl Into<Reason>) {
         self.doubts.push(reason.into());
     }
 
     /// Adds a note.
-    pub fn note(&mut self, reason: impl Into<String>) {
+    pub fn note(&mut self, reason: impl Into<Reason>) {
         self.others.push(reason.into());
     }
 
@@ -127,7 +115,10 @@ impl VerdictBuilder {
             }
         }
         if !self.limits_stated {
-            self.note(NO_LIMITS);
+            self.note(Reason::new(
+                ReasonKind::NoLimits,
+                "held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)",
+            ));
         }
     }
 
@@ -187,7 +178,7 @@ impl VerdictBuilder {
         if status == Judgement::Fail
             && let Some(benefit) = self.benefit.and_then(|k| self.others.get_mut(k))
         {
-            benefit.insert_str(0, "apart from the problems above: ");
+            benefit.text.insert_str(0, "apart from the problems above: ");
         }
         reasons.append(&mut self.others);
         Verdict { status, reasons }

@@ -24,6 +24,8 @@ pub struct Dataset {
     pub other_columns: Vec<String>,
     /// Notes for the user: columns skipped, blank rows dropped.
     pub notes: Vec<String>,
+    /// Whether the points of a tracker were joined to the rows by their times: then clocks that differ shift them.
+    pub joined_by_time: bool,
     /// Names of the stations as the file has them, in the order of [`Row::anchor`]; none without a column of stations.
     pub station_names: Vec<String>,
     /// Step to which the angles are rounded (rad); absent where no common step divides all of them.
@@ -45,6 +47,7 @@ impl Dataset {
             rows: rows.into(),
             other_columns: Vec::new(),
             notes: Vec::new(),
+            joined_by_time: false,
             station_names: Vec::new(),
             angle_step_rad: None,
             readout_step_mm: None,

@@ -17,7 +17,7 @@ mod clock;
 mod column_names;
 mod columns;
 mod error;
-pub(crate) mod join_by_time;
+mod join_by_time;
 mod options;
 mod tracker_export;
 mod foreign;
@@ -28,6 +28,7 @@ pub use error::{ImportError, Location};
 pub use options::{Options, TimeMatching};
 
 use sha2::{Digest, Sha256};
+use truegrind_math::digest;
 
 use self::cell::{Cell, Line, Table};
 use self::columns::HeaderColumns;
@@ -61,7 +62,7 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
         }
         from_text(file, &csv::Text::of(file, bytes)?, options)?
     };
-    dataset.sha256 = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
+    dataset.sha256 = digest::sha256(bytes);
     Ok(dataset)
 }
 
@@ -115,9 +116,10 @@ pub fn read_joined_by_time(
     clocks: &TimeMatching,
     options: &Options,
 ) -> Result<Dataset, ImportError> {
-    read_together(log, points, options, |measured, table| {
+    let joined = read_together(log, points, options, |measured, table| {
         join_by_time::join_by_time(&measured, log.0, table, clocks)
-    })
+    })?;
+    Ok(Dataset { joined_by_time: true, ..joined })
 }
 
 fn read_together(
@@ -150,7 +152,7 @@ fn read_together(
     let mut dataset = rows::dataset(log.0, &table, &columns, options, std::iter::empty())?;
     dataset.notes.splice(0..0, notes);
     let digest = Sha256::new().chain_update(log.1).chain_update(points.1).finalize();
-    dataset.sha256 = digest.iter().map(|b| format!("{b:02x}")).collect();
+    dataset.sha256 = digest::hex(&digest);
     Ok(dataset)
 }
 
@@ -211,7 +213,7 @@ pub fn from_rows(
         Ok(Line { number, cells })
     });
     let mut dataset = rows::dataset(file, &table, &columns, options, lines)?;
-    dataset.sha256 = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
+    dataset.sha256 = digest::hex(&digest.finalize());
     Ok(dataset)
 }
 

@@ -130,7 +130,7 @@ impl Tracker {
         };
         let reported_of_shape = self.state.alarms.iter().any(is_of_shape);
         let (turn, last_link) = (self.turn(&poses), self.last_link());
-        let is_of_shape = whole.is_beyond(SHARE * self.initial.geometry.held_out.rmse)
+        let is_of_shape = whole.is_beyond(SHARE * self.initial.calibrated.held_out.rmse)
             || since.as_ref().is_some_and(|since| since.is_beyond(SHARE * noise_mm))
             || (reported_of_shape && std::iter::once(&whole).chain(&since).any(|d| d.rms_mm > d.expected_mm));
         Some(Departure {

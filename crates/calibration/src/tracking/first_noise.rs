@@ -54,7 +54,7 @@ impl FirstPoses {
     ) -> Result<Self, TrackError> {
         let dataset = &observed.dataset;
         let axes = dataset.sensor.axes() as f64;
-        let unexplained_mm = model.geometry.held_out.rmse / axes.sqrt();
+        let unexplained_mm = model.calibrated.held_out.rmse / axes.sqrt();
         let (kept, fitted) = robust_registration(model, observed, unexplained_mm)?;
         // Residuals of the few poses that registered the sensor underestimate the noise; the held-out error of the
         // identification is its lower bound.

@@ -3,7 +3,7 @@
 use super::tracker::Tracker;
 use crate::identification::calibration::{CalibrationProblem, Frames};
 use crate::measurement::dataset::{Dataset, Sensor};
-use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Verdict};
+use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Reason, Verdict};
 use truegrind_arm::model::Model;
 use truegrind_math::statistics::ErrorSummary;
 
@@ -42,7 +42,7 @@ impl Tracker {
             out.provenance.sha256.clone_from(&last.digest);
         }
         if !self.state.history.is_empty() {
-            out.geometry.fitted = ErrorSummary::of(self.state.history.iter().map(|s| s.error_mm));
+            out.calibrated.fitted = ErrorSummary::of(self.state.history.iter().map(|s| s.error_mm));
         }
         out.condition = self.condition;
         out.region.clone_from(&self.state.region);
@@ -57,13 +57,13 @@ impl Tracker {
         out
     }
 
-    fn reasons(&self) -> Vec<String> {
-        let mut reasons = vec![format!(
+    fn reasons(&self) -> Vec<Reason> {
+        let mut reasons = vec![Reason::from(format!(
             "tracked over {} poses since {}, {} set aside as outliers; held-out errors are those of the first \
              identification",
             self.state.poses, self.initial.provenance.file, self.state.outliers
-        )];
-        reasons.extend(self.state.alarms.iter().map(ToString::to_string));
+        ))];
+        reasons.extend(self.state.alarms.iter().map(|alarm| alarm.to_string().into()));
         reasons
     }
 }

@@ -271,7 +271,7 @@ pub(super) fn digest<'r>(rows: impl Iterator<Item = &'r Row>) -> String {
             Reading::Pose(pose) => vector_from_pose(pose).iter().for_each(|v| number(*v)),
         }
     }
-    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    truegrind_math::digest::hex(&hash.finalize())
 }
 
 /// Limit of a region's samples.

@@ -112,7 +112,7 @@ fn a_joint_that_lost_its_zero_is_named_with_its_size_and_its_pose() {
     let after = tracker.model();
     let theta = |m: &Estimated| m.model.links[2].theta_rad;
     assert!(((theta(&after) - theta(model())).to_degrees() - 0.05).abs() < 0.01);
-    assert!(after.verdict.reasons.iter().any(|r| r == &alarm.to_string()));
+    assert!(after.verdict.reasons.iter().any(|r| r.text == alarm.to_string()));
     let again = Estimated::from_toml(&after.to_toml().unwrap()).unwrap();
     assert_eq!(again.model.links[2].theta_rad.to_degrees(), after.model.links[2].theta_rad.to_degrees());
 }

@@ -298,7 +298,7 @@ impl UnknownPlacement<'_, '_> {
 
     /// Standard deviation of a reading, each coordinate (mm), from the held-out error.
     fn reading_mm(&self) -> f64 {
-        let rmse = self.knowledge.geometry.held_out.rmse;
+        let rmse = self.knowledge.calibrated.held_out.rmse;
         let coordinates: f64 = if self.knowledge.provenance.sensor == Sensor::Cable { 1.0 } else { 3.0 };
         let sigma = rmse / coordinates.sqrt();
         if sigma > 0.0 && sigma.is_finite() { sigma.max(FINEST_MM) } else { READING_MM }

@@ -80,7 +80,7 @@ fn estimated(model: Model, joints: &[Joints]) -> Estimated {
         order,
         provenance: Provenance::default(),
         registered: zero,
-        geometry: zero,
+        calibrated: zero,
         noise_floor_mm: None,
         beyond_noise_mm: None,
         beyond_noise_rad: None,

@@ -223,7 +223,7 @@ fn fitted(known: &Estimated, rows: &Dataset) -> DMatrix<f64> {
     let own = frame_parameters(rows);
     let parameters = [known.order.clone(), own.clone()].concat();
     let priors = Tolerance::default().priors(&parameters, &known.model);
-    let sigma_mm = known.geometry.held_out.rmse / 3.0_f64.sqrt();
+    let sigma_mm = known.calibrated.held_out.rmse / 3.0_f64.sqrt();
     let weights = vec![Weight { per_mm: 1.0 / sigma_mm, per_rad: 1.0 }; rows.rows.len()];
     let n = known.order.len();
     // Sensor and target first, with the arm as it is known.
@@ -271,7 +271,7 @@ fn where_the_axis_of_joint_6_is_not_known_a_target_beside_it_is_named_and_brings
     assert!(moved < 0.02, "a target on the axis moves by {moved} mm");
     known.covariance += &unseen * unseen.transpose();
     known.provenance.sensor = Sensor::Position;
-    known.geometry.held_out.rmse = 0.03 * 3.0_f64.sqrt();
+    known.calibrated.held_out.rmse = 0.03 * 3.0_f64.sqrt();
     // The position's deviation is less than its uncertainty.
     known.nominal = known.model.clone();
     let before = scene.planned(&known, &Cell::default(), 0.1);

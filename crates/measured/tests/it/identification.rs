@@ -37,7 +37,7 @@ fn robocali_meets_the_reference() {
             // Base against link 1, touched point against link 6, and one combination through the arm.
             assert!(report.rank < report.parameters && !report.combinations.is_empty());
             registered += found.estimated.registered.held_out.rmse / 3.0;
-            geometry += found.estimated.geometry.held_out.rmse / 3.0;
+            geometry += found.estimated.calibrated.held_out.rmse / 3.0;
         }
         assert!(geometry <= limit, "sharpened {fuse_readout}: {geometry:.3} mm against {limit}");
         assert!(geometry < registered, "geometry must help on rows it never saw");

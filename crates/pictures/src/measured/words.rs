@@ -115,7 +115,7 @@ fn verdict(text: &mut String, found: &Identification) {
     let method = line(&found.estimated.provenance.method);
     let _ = writeln!(text, "Method: **{method}**. Verdict: **{status}**.\n");
     for reason in &verdict.reasons {
-        let _ = writeln!(text, "- {}", line(reason));
+        let _ = writeln!(text, "- {}", line(&reason.text));
     }
     text.push('\n');
 }
@@ -132,8 +132,8 @@ fn errors(text: &mut String, found: &Identification) {
     }
     row("frames, fitted rows", &estimated.registered.fitted);
     row("frames, held out", &estimated.registered.held_out);
-    row("geometry, fitted rows", &estimated.geometry.fitted);
-    row("geometry, held out", &estimated.geometry.held_out);
+    row("geometry, fitted rows", &estimated.calibrated.fitted);
+    row("geometry, held out", &estimated.calibrated.held_out);
     let _ = writeln!(
         text,
         "\nNoise floor {} mm; {} rows set aside.\n",

@@ -45,6 +45,7 @@ fn dataset(count: usize) -> Dataset {
         sensor: Sensor::Cable,
         rows: rows.collect(),
         notes: vec!["1 column without a header skipped".to_owned()],
+        joined_by_time: false,
         station_names: Vec::new(),
         angle_step_rad: None,
         readout_step_mm: None,

@@ -44,7 +44,8 @@ pub fn stage_table(found: &Identification) -> Table {
     };
     push("raw", "all", found.raw.as_ref());
     let estimated = &found.estimated;
-    for (stage, errors) in [("frames registered", &estimated.registered), ("geometry", &estimated.geometry)] {
+    for (stage, errors) in [("frames registered", &estimated.registered), ("geometry", &estimated.calibrated)]
+    {
         push(stage, "fitted", Some(&errors.fitted));
         push(stage, "held out", Some(&errors.held_out));
     }

@@ -17,7 +17,7 @@ use truegrind_math::sentence::listed;
 /// Remarks on the errors.
 pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> {
     let mut out = Vec::new();
-    let errors = &found.estimated.geometry;
+    let errors = &found.estimated.calibrated;
     let (fitted, held) = (errors.fitted.rmse, errors.held_out.rmse);
     if held > 1.5 * fitted && fitted > 0.0 {
         out.push(format!(

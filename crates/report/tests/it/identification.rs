@@ -1,6 +1,6 @@
 //! Tables, sentences, JSON and page of an identification.
 
-use truegrind_arm::estimated::{EstimatedParameter, Judgement, StageErrors};
+use truegrind_arm::estimated::{EstimatedParameter, Judgement, Reason, ReasonKind, StageErrors};
 use truegrind_arm::link::LinkModel;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_arm::sensor::Sensor;
@@ -10,7 +10,6 @@ use truegrind_calibration::identification::fit::Outlier;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
-use truegrind_calibration::identification::verdict::{NOT_NOISE, TARGET_NOT_SHOWN};
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_report::format::{csv, markdown, terminal};
 use truegrind_report::identification as view;
@@ -58,7 +57,7 @@ fn by_hand() -> Identification {
         max: 2.0 * rmse,
     };
     found.estimated.registered = StageErrors { fitted: summary(96, 2.0), held_out: summary(24, 2.1) };
-    found.estimated.geometry = StageErrors { fitted: summary(96, 0.4), held_out: summary(24, 0.5) };
+    found.estimated.calibrated = StageErrors { fitted: summary(96, 0.4), held_out: summary(24, 0.5) };
     found
 }
 
@@ -73,7 +72,7 @@ fn repeated_poses_that_show_more_than_noise_head_a_warning() {
     for status in [Judgement::NotEvaluated, Judgement::Pass] {
         found.estimated.verdict.status = status;
         found.estimated.verdict.reasons =
-            vec![format!("{NOT_NOISE}: they differ by 0.350 mm in one direction")];
+            vec![Reason::new(ReasonKind::MoreThanNoise, "they differ by 0.350 mm in one direction")];
         let text = terminal::document(&view::summary(&found), 300);
         assert!(text.contains("[warning] The model may be used"), "{text}");
         assert!(text.contains("by 0.350 mm in one direction"), "{text}");
@@ -87,7 +86,7 @@ fn repeated_poses_that_show_more_than_noise_head_a_warning() {
 fn a_target_that_the_poses_do_not_show_is_in_the_headline() {
     let mut found = by_hand();
     found.estimated.verdict.status = Judgement::NotEvaluated;
-    found.estimated.verdict.reasons = vec![format!("these poses, of one kind, {TARGET_NOT_SHOWN}: ...")];
+    found.estimated.verdict.reasons = vec![Reason::new(ReasonKind::TargetNotShown, "...")];
     let text = terminal::document(&view::summary(&found), 400);
     assert!(text.contains("frames alone; errors are those of the target"), "{text}");
 }
@@ -230,7 +229,7 @@ fn what_makes_up_for_an_unseen_link_is_named() {
 fn a_verdict_is_one_sentence_with_its_reasons() {
     let mut found = by_hand();
     let head = |found: &Identification| terminal::document(&view::summary(found), 300);
-    found.estimated.verdict.reasons = vec!["because".to_owned()];
+    found.estimated.verdict.reasons = vec!["because".into()];
     for (status, badge, sentence) in [
         (Judgement::Pass, "[ok]", "The model may be used; it meets the stated limits"),
         (Judgement::Fail, "[failed]", "The model must not be used"),
@@ -309,7 +308,7 @@ fn the_json_holds_everything_and_every_held_out_row() {
     assert_eq!(rows[0]["row"], found.held_out[0].0);
     assert_eq!(rows[0]["geometry_mm"], found.held_out[0].2);
     assert!(json["stages"]["raw"].is_null());
-    assert_eq!(json["stages"]["geometry"]["held_out"]["rmse"], found.estimated.geometry.held_out.rmse);
+    assert_eq!(json["stages"]["geometry"]["held_out"]["rmse"], found.estimated.calibrated.held_out.rmse);
     let arm = json["parameters"].as_array().unwrap();
     let frames = json["frames"].as_array().unwrap();
     assert_eq!(arm.len(), 24);

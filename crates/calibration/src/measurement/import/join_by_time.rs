@@ -11,9 +11,6 @@ use super::error::{ImportError, Location};
 use super::options::TimeMatching;
 use super::tracker_export::{Point, Points, cells, headed, unusable};
 
-/// Begin of the note on rows that were joined by time, after their number.
-pub(crate) const JOINED_BY_TIME: &str = "rows joined by time with";
-
 /// Columns of a log that hold the time, in this order of preference.
 const TIMES: [&str; 5] = ["time", "timestamp", "time_stamp", "datetime", "date_time"];
 
@@ -254,7 +251,7 @@ impl Pairing<'_> {
             ahead => format!(", the tracker's clock taken as {ahead} s ahead"),
         };
         let mut notes = vec![format!(
-            "{} {JOINED_BY_TIME} {} measured points, at most {largest:.3} s apart ({} s were allowed){ahead}",
+            "{} rows joined by time with {} measured points, at most {largest:.3} s apart ({} s were allowed){ahead}",
             pairs.len(),
             self.points.all.len(),
             self.clocks.within_s

@@ -10,7 +10,7 @@ use super::cell::{Cell, Line, Table};
 use super::columns::HeaderColumns;
 use super::error::{ImportError, Location};
 use super::options::Options;
-use super::rounding;
+use super::rounding::{self, StepSearch};
 use crate::measurement::dataset::{Dataset, Extra, PathPoint, Reading, Row, Sensor};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
@@ -31,7 +31,7 @@ pub(super) fn dataset(
     let mut notes = columns.notes.clone();
     let reader = Reader { file, sheet: table.sheet.as_deref(), header: &table.rows[columns.header] };
     let (mut rows, mut blank, mut unnamed, mut as_text) = (Vec::new(), table.blank_lines, 0usize, 0usize);
-    let mut conditions = Conditions::default();
+    let (mut conditions, mut angles) = (Conditions::default(), Angles::default());
     let (mut numbered, mut stations) = (None, Stations::default());
     let lines = table.rows[columns.header + 1..].iter().map(|line| Ok(Cow::Borrowed(line)));
     for line in lines.chain(further.map(|line| line.map(Cow::Owned))) {
@@ -69,7 +69,7 @@ pub(super) fn dataset(
                 return Err(reader.wrong(line, column, expected, remedy));
             }
         }
-        let mut row = reader.row(line, columns, &mut conditions)?;
+        let mut row = reader.row(line, columns, &mut conditions, &mut angles)?;
         row.anchor += stations.index_of(columns.station.and_then(|column| line.cells.get(column)));
         rows.push(row);
     }
@@ -93,12 +93,14 @@ pub(super) fn dataset(
     }
     check_outlets(&reader, columns, &rows)?;
     if !options.allow_odd_units {
-        check_units(&reader, &rows, columns.sensor)?;
+        check_units(&reader, &rows, &angles, columns.sensor)?;
     }
-    let degrees = rows.iter().flat_map(|r| r.joints.iter().map(|q| q.to_degrees()));
-    let angle_step_rad = rounding::step(degrees).map(f64::to_radians);
-    let readouts = rows.iter().filter_map(Row::readout_mm).flat_map(|v| [v.x, v.y, v.z]);
-    let readout_step_mm = rounding::step(readouts);
+    let angle_step_rad = angles.step.found().map(f64::to_radians);
+    let mut readout_step = StepSearch::default();
+    for v in rows.iter().filter_map(Row::readout_mm) {
+        v.iter().for_each(|coordinate| readout_step.add(*coordinate));
+    }
+    let readout_step_mm = readout_step.found();
     let reading_step_mm = reading_step(&rows, columns.sensor);
     Ok(Dataset {
         file: file.into(),
@@ -108,6 +110,7 @@ pub(super) fn dataset(
         rows: rows.into(),
         other_columns: columns.other.iter().map(|(name, _)| name.clone()).collect(),
         notes,
+        joined_by_time: false,
         station_names: stations.names(),
         angle_step_rad,
         readout_step_mm,
@@ -276,11 +279,13 @@ impl Reader<'_> {
         line: &Line,
         columns: &HeaderColumns,
         conditions: &mut Conditions,
+        angles: &mut Angles,
     ) -> Result<Row, ImportError> {
         let mut joints = Joints::zeros();
-        for (q, &column) in joints.iter_mut().zip(&columns.joints) {
-            let angle = self.bounded(line, column, LARGEST_DEG, "an angle in degrees, within ±3600")?;
-            *q = angle.to_radians();
+        for (joint, &column) in columns.joints.iter().enumerate() {
+            let angle_deg = self.bounded(line, column, LARGEST_DEG, "an angle in degrees, within ±3600")?;
+            angles.add(joint, angle_deg);
+            joints[joint] = angle_deg.to_radians();
         }
         let reading = self.reading(line, columns)?;
         let readout_mm = match columns.readout {
@@ -446,19 +451,49 @@ fn number_anchors(rows: &mut [Row]) -> Option<String> {
     })
 }
 
+/// The angles of a file as its cells have them (°): their ranges, and the step to which they are rounded.
+struct Angles {
+    min_deg: [f64; 6],
+    max_deg: [f64; 6],
+    step: StepSearch,
+}
+
+impl Default for Angles {
+    fn default() -> Self {
+        Self { min_deg: [f64::MAX; 6], max_deg: [f64::MIN; 6], step: StepSearch::default() }
+    }
+}
+
+impl Angles {
+    fn add(&mut self, joint: usize, angle_deg: f64) {
+        self.min_deg[joint] = self.min_deg[joint].min(angle_deg);
+        self.max_deg[joint] = self.max_deg[joint].max(angle_deg);
+        self.step.add(angle_deg);
+    }
+
+    /// The largest angle, by its size.
+    fn largest_deg(&self) -> f64 {
+        self.min_deg.iter().chain(&self.max_deg).fold(0.0, |most, angle| angle.abs().max(most))
+    }
+
+    /// The largest range of a joint.
+    fn spread_deg(&self) -> f64 {
+        self.min_deg.iter().zip(&self.max_deg).map(|(min, max)| max - min).fold(0.0, f64::max)
+    }
+}
+
 /// Checks of units that need no model of the arm; `plausibility` has those that do.
-fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), ImportError> {
+fn check_units(
+    reader: &Reader<'_>,
+    rows: &[Row],
+    angles: &Angles,
+    sensor: Sensor,
+) -> Result<(), ImportError> {
     let units = |columns: &str, found: String, expected, remedy| {
         let location = Location { column: Some(columns.into()), ..reader.location() };
         Err(ImportError::Units { location, found: found.into(), expected, remedy })
     };
-    let largest_deg = rows.iter().map(|r| r.joints.amax().to_degrees()).fold(0.0, f64::max);
-    let spread_deg = (0..6)
-        .map(|j| {
-            let angles = || rows.iter().map(|r| r.joints[j].to_degrees());
-            angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min)
-        })
-        .fold(0.0, f64::max);
+    let (largest_deg, spread_deg) = (angles.largest_deg(), angles.spread_deg());
     // Joints that move, but never beyond ±2π "degrees" in the whole file, are in radians.
     if rows.len() >= 3 && spread_deg > 0.05 && largest_deg <= 2.0 * std::f64::consts::PI + 1e-6 {
         return units(

@@ -69,7 +69,7 @@ fn wild_readings_change_neither_the_size_of_a_finding_nor_what_is_said_of_the_po
         let found = diagnosed(&run(&arm(), hidden, &setup(200, 11)).dataset, &arm());
         let worth = finding(&found, "gear-eccentricity").and_then(|gear| gear.worth_mm).unwrap();
         let reasons = found.estimated.verdict.reasons;
-        assert!(!reasons.iter().any(|reason| reason.contains("where the target sits")), "{reasons:?}");
+        assert!(!reasons.iter().any(|reason| reason.text.contains("where the target sits")), "{reasons:?}");
         worth
     };
     let alone = told(std::slice::from_ref(&gear));
@@ -175,8 +175,8 @@ fn of_too_few_poses_no_benefit_is_stated() {
     assert!(found.diagnosis.poses_needed.is_some() && found.benefit.is_none());
     let verdict = &found.estimated.verdict;
     assert_eq!(verdict.status, Judgement::Doubtful, "{verdict:?}");
-    assert!(verdict.reasons[0].contains("too few"), "{verdict:?}");
-    assert!(!verdict.reasons.iter().any(|reason| reason.contains("expected RMS")), "{verdict:?}");
+    assert!(verdict.reasons[0].text.contains("too few"), "{verdict:?}");
+    assert!(!verdict.reasons.iter().any(|reason| reason.text.contains("expected RMS")), "{verdict:?}");
 }
 
 /// Another series of the same arm judges the arm that is written: here first as it is, then one that is worse than geometry there.
@@ -202,7 +202,7 @@ fn another_series_judges_the_written_arm() {
     worse.estimated.model = wrong;
     worse.test_on(&other, &frames(&other, &arm()), &tolerance, true);
     assert_eq!(worse.estimated.verdict.status, Judgement::Fail);
-    assert!(worse.estimated.verdict.reasons[0].contains("`identify`"), "{:?}", worse.estimated.verdict);
+    assert!(worse.estimated.verdict.reasons[0].text.contains("`identify`"), "{:?}", worse.estimated.verdict);
     assert_eq!(worse.diagnosis.verdict.as_ref(), Some(&worse.estimated.verdict));
 }
 
@@ -223,7 +223,7 @@ fn another_measurement_says_that_the_arm_was_another() {
         let mut judged = found.clone();
         judged.test_on(&changed, &frames(&changed, &arm()), &tolerance, true);
         let verdict = judged.estimated.verdict;
-        (verdict.status, verdict.reasons[0].clone())
+        (verdict.status, verdict.reasons[0].text.clone())
     };
     assert_eq!(with(&|_| ()).0, Judgement::NotEvaluated, "the arm itself");
     let (status, said) = with(&|row| row.joints[1] += 0.1_f64.to_radians());
@@ -236,7 +236,7 @@ fn another_measurement_says_that_the_arm_was_another() {
     let verdict = judged.estimated.verdict;
     assert!(
         matches!(verdict.status, Judgement::Doubtful | Judgement::Fail)
-            && verdict.reasons[0].contains("another"),
+            && verdict.reasons[0].text.contains("another"),
         "{verdict:?}"
     );
 }

@@ -142,7 +142,8 @@ fn what_the_target_saw_is_stated_for_a_longer_tool() {
         let stated = erring.displacement_mm(&tool, &estimated.beyond_noise_rad.unwrap());
         let ratio = erring.displacement_mm(&tool, &RAD) / stated;
         assert!((1.0 / 1.3..1.3).contains(&ratio), "seed {seed}: true over stated {ratio}");
-        let told = estimated.verdict.reasons.iter().any(|reason| reason.contains("tool tip 300 mm in front"));
+        let told =
+            estimated.verdict.reasons.iter().any(|reason| reason.text.contains("tool tip 300 mm in front"));
         assert_eq!(told, is_told, "seed {seed}: {:?}", estimated.verdict.reasons);
     }
 }

@@ -97,6 +97,7 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
         sensor,
         rows,
         notes: Vec::new(),
+        joined_by_time: false,
         station_names: Vec::new(),
         angle_step_rad: None,
         readout_step_mm: None,

@@ -8,9 +8,9 @@ use rand_distr::{Distribution, StandardNormal};
 use super::unseen_target::{arm, start, tracker};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::beyond_noise::ErringArm;
+use truegrind_arm::estimated::{Reason, ReasonKind};
 use truegrind_arm::model::Joints;
 use truegrind_calibration::identification::identify::{Identification, Options, identify};
-use truegrind_calibration::identification::verdict::NOT_NOISE;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::split;
 use truegrind_math::se3::Pose;
@@ -98,8 +98,8 @@ fn stated_over_true(event: Event, found: &Identification) -> f64 {
     estimated.beyond_noise_mm.unwrap() / erring.displacement_mm(&target, &rad)
 }
 
-fn warning(found: &Identification) -> Option<&String> {
-    found.estimated.verdict.reasons.iter().find(|reason| reason.starts_with(NOT_NOISE))
+fn warning(found: &Identification) -> Option<&Reason> {
+    found.estimated.verdict.reasons.iter().find(|reason| reason.kind == ReasonKind::MoreThanNoise)
 }
 
 /// The scatter of repeated poses was taken off as noise, whatever made it: the rest was a third of the arm's error, or nothing.
@@ -118,7 +118,7 @@ fn what_moved_between_repetitions_is_not_taken_off_as_noise() {
             let found = found(event, seed);
             let ratio = stated_over_true(event, &found);
             assert!((1.0 / 1.5..1.7).contains(&ratio), "{event:?}, seed {seed}: stated over true {ratio}");
-            told += usize::from(warning(&found).is_some_and(|said| said.contains(words)));
+            told += usize::from(warning(&found).is_some_and(|said| said.text.contains(words)));
         }
         assert!(told >= 3, "{event:?}: told in {told} of 6");
     }

@@ -65,7 +65,7 @@ fn outcome(angles: Angles, step_deg: f64, gears_rad: [f64; 6], seed: u64) -> Out
     dataset.angle_step_rad = Some(step);
     let halves = |rows: &Dataset| split::random(rows, 0.2, 0);
     let found = identify(&dataset, "arm", &nominal, &start(&dataset), &halves, &Options::default()).unwrap();
-    let is_told = found.estimated.verdict.reasons.iter().any(|reason| reason.contains("log rounds"));
+    let is_told = found.estimated.verdict.reasons.iter().any(|reason| reason.text.contains("log rounds"));
     assert_eq!(is_told, angles == Angles::Rounded, "{:?}", found.estimated.verdict.reasons);
     let target = Pose::translation(TARGET_MM[0], TARGET_MM[1], TARGET_MM[2]);
     let links_mm = placed_rms_mm(&actual, &found.estimated.model, &fresh, &target);

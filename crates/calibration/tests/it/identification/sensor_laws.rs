@@ -132,7 +132,7 @@ fn a_box_of_poses_that_does_not_tell_the_arm_from_a_pulley_writes_no_worse_arm()
         let context = format!("seed {seed}: {sheet_mm:.3} to {estimated_mm:.3} mm, {verdict:?}");
         assert!(matches!(verdict.status, Judgement::Doubtful | Judgement::Fail), "{context}");
         if verdict.status == Judgement::Doubtful {
-            assert!(verdict.reasons.iter().any(|reason| reason.contains("over a pulley")), "{context}");
+            assert!(verdict.reasons.iter().any(|reason| reason.text.contains("over a pulley")), "{context}");
         }
     }
     assert!(worse > 2, "the box must be one that misleads: {worse} of 5");
@@ -209,7 +209,7 @@ fn a_part_before_a_camera_whose_lens_distorts_writes_no_worse_arm() {
             if estimated_mm > sheet_mm {
                 worse += 1;
                 assert!(!is_written, "{context}");
-                let names = |words: &str| verdict.reasons.iter().any(|reason| reason.contains(words));
+                let names = |words: &str| verdict.reasons.iter().any(|reason| reason.text.contains(words));
                 // A slight distortion is a scale error in first degree, which is the simpler explanation and as well the sensor's.
                 let names_sensor = names("lens distorts") || names("a sensor that reads");
                 assert!(names_sensor || verdict.status == Judgement::Fail, "{context}");

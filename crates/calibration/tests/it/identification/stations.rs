@@ -89,7 +89,7 @@ fn a_station_of_few_poses_neither_makes_nor_hides_an_error() {
     let part = |from: usize, to: usize| all.subset(&(from..to).collect::<Vec<_>>());
     let [fitted, mut further] = [part(0, 160), part(160, 280)];
     further.sha256.clear();
-    let held_out = |rows: Dataset| identified(&matched(rows)).estimated.geometry.held_out.rmse;
+    let held_out = |rows: Dataset| identified(&matched(rows)).estimated.calibrated.held_out.rmse;
     let one = held_out(fitted.clone());
     for stations in [8, 20, 30] {
         let several = held_out(moved_often(fitted.clone(), stations));
@@ -156,7 +156,7 @@ fn three_stations_give_the_arm_that_one_gives() {
         assert_eq!(several.stations(), 3);
         assert!(several.notes.iter().any(|note| note.starts_with("3 stations with 60, 60 and 60 rows")));
         let found = identified(&several);
-        let held_out = |of: &Identification| of.estimated.geometry.held_out.rmse;
+        let held_out = |of: &Identification| of.estimated.calibrated.held_out.rmse;
         assert!(held_out(&found) < 1.2 * held_out(&one), "{sensor}: {} {}", held_out(&found), held_out(&one));
         for (a, b) in found.estimated.parameters.iter().zip(&one.estimated.parameters) {
             // Twelve more unknowns: wider, but never another arm.

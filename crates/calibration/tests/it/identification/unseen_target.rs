@@ -106,8 +106,9 @@ fn identified(dataset: &Dataset, frames: &Frames, target_mm: f64) -> Identificat
     identify(dataset, "arm", &arm(), frames, &halves, &options).unwrap()
 }
 
-fn told(found: &Identification) -> Option<&String> {
-    found.estimated.verdict.reasons.iter().find(|reason| reason.contains("where the target sits"))
+fn told(found: &Identification) -> Option<&str> {
+    let is_told = |reason: &&str| reason.contains("where the target sits");
+    found.estimated.verdict.sentences().into_iter().find(is_told)
 }
 
 #[test]

@@ -22,7 +22,7 @@ fn tracker(rows: usize, noise_mm: f64, scale: f64) -> Case {
 }
 
 fn reasons(outcome: &Outcome) -> String {
-    outcome.found.as_ref().unwrap().estimated.verdict.reasons.join("\n")
+    outcome.found.as_ref().unwrap().estimated.verdict.sentences().join("\n")
 }
 
 /// The class: a rival that is no geometry explains the rows as well and is never asked.
@@ -79,7 +79,7 @@ fn implausible_links_are_one_reason() {
     ] {
         let verdict = off(millimetres);
         assert_eq!(verdict.status, Judgement::Fail);
-        assert_eq!(verdict.reasons, [format!("{expected}: {causes}")]);
+        assert_eq!(verdict.sentences(), [format!("{expected}: {causes}")]);
     }
 }
 
@@ -92,7 +92,7 @@ fn an_unknown_held_out_error_does_not_pass() {
         verdict.check_held_out(before, after);
         let verdict = verdict.build();
         assert_eq!(verdict.status, Judgement::Fail, "{before} {after}");
-        assert!(verdict.reasons[0].contains("unknown"), "{:?}", verdict.reasons);
+        assert!(verdict.reasons[0].text.contains("unknown"), "{:?}", verdict.reasons);
     }
     let mut verdict = VerdictBuilder::default();
     let limits = Limits { rmse_mm: Some(1.0), max_mm: Some(1.0) };
@@ -202,7 +202,7 @@ fn a_diagnosis_says_every_verdict_of_an_identification() {
     assert_eq!(good.status, Judgement::NotEvaluated, "{:?}", good.reasons);
     let link = verdict(&|nominal| nominal.links[1].a_mm += 20.0);
     assert_eq!(link.status, Judgement::Fail, "{:?}", link.reasons);
-    assert!(link.reasons[0].contains("link2.a"), "{:?}", link.reasons);
+    assert!(link.reasons[0].text.contains("link2.a"), "{:?}", link.reasons);
 }
 
 /// A verdict travels in the file.

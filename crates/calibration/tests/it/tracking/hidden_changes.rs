@@ -193,7 +193,7 @@ fn an_uncertain_first_model_hides_no_change_since_the_first_poses() {
 #[test]
 fn a_noise_that_is_several_times_too_large_is_replaced_by_what_the_first_poses_scatter() {
     let mut coarse = model().clone();
-    coarse.geometry.held_out.rmse = 0.2;
+    coarse.calibrated.held_out.rmse = 0.2;
     let track = |dataset: &Dataset, options: &Options| {
         let mut tracker = Tracker::begin(&coarse, "hash", dataset, options).unwrap();
         let alarms = tracker.process_file(dataset).unwrap();
