@@ -12,7 +12,7 @@ MODULE Refusals
     MoveJ [[200,-100,400],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: nothing
     MoveL [[200,100,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v2000,fine,tool0; ! expect: joint 1 exceeds its speed limit
     MoveJ [[250,-230,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: nothing
-    MoveL [[420,-230,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z200,tool0; ! expect: nothing
+    MoveL [[420,-230,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z200,tool0; ! expect: the path to it deviates
     MoveL [[420,230,320],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: rounded corner
     IF near() MoveL [[420,-230,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: the path to it deviates
     MoveJ [[328.0385,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: nothing

@@ -27,11 +27,12 @@ use crate::identification::verdict::VerdictBuilder;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::NoiseFloor;
 use crate::measurement::split;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::cell::OnceCell;
 use truegrind_arm::estimated::{
     Estimated, EstimatedParameter, Judgement, Provenance, Reason, ReasonKind, StageErrors, Verdict,
 };
+use truegrind_arm::parameter::Parameter;
 use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::problem::Problem;
@@ -83,6 +84,8 @@ struct WrittenArm<'a> {
     /// Errors of the fit with the certain causes of the measurement: what it lacks beyond the errors with all causes is the arm's, and
     /// what a fit without the causes of the measurement lacks beyond that is not.
     beside_sensor: StageError,
+    /// The fit with the causes of the measurement, where it is not written.
+    with_sensor: Option<&'a Extended>,
 }
 
 impl Handover<'_> {
@@ -91,10 +94,9 @@ impl Handover<'_> {
         let (search, discrepancy) = (self.search, self.discrepancy);
         let certain = certain_model(search, certain, discrepancy);
         let beside_sensor = certain.errors;
-        let (WrittenFit { fit, errors }, probability) =
-            without_measurement_causes(search, certain, discrepancy);
+        let (WrittenFit { fit, errors }, left_out) = without_measurement_causes(search, certain, discrepancy);
         let fit = if fit.causes.is_empty() { self.as_identified(&fit).unwrap_or(fit) } else { fit };
-        notes.extend(probability.map(|probability| {
+        notes.extend(left_out.as_ref().map(|LeftOut { probability, .. }| {
             format!(
                 "the written arm was fitted without the causes in the measurement, which might make its links worse (probability \
                  {:.0} %, at most {:.0} % are allowed)",
@@ -102,14 +104,16 @@ impl Handover<'_> {
                 100.0 * sensor_causes::MOST_PROBABILITY
             )
         }));
+        let with_sensor = left_out.as_ref().map(|left_out| &left_out.fit);
         let with_uncertain = with_uncertain_causes(search, &fit, discrepancy);
         let with_causes = self.estimated(&WrittenArm {
             with_uncertain: with_uncertain.as_ref().unwrap_or(&fit),
             fitted: &fit,
             errors,
             beside_sensor,
+            with_sensor,
         });
-        self.or_geometry_alone(with_causes, beside_sensor, notes)
+        self.or_geometry_alone(with_causes, beside_sensor, with_sensor, notes)
     }
 
     /// The written arm with its benefit, or geometry alone (with a note) if only that is not refused.
@@ -120,6 +124,7 @@ impl Handover<'_> {
         &self,
         with_causes: HandedOver,
         beside_sensor: StageError,
+        with_sensor: Option<&Extended>,
         notes: &mut Vec<String>,
     ) -> HandedOver {
         let verdict = &with_causes.estimated.verdict;
@@ -133,6 +138,7 @@ impl Handover<'_> {
             with_uncertain: &plain,
             errors: self.search.validation.stage(&plain),
             beside_sensor,
+            with_sensor,
         });
         if !matches!(alone.estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated) {
             return with_causes;
@@ -174,7 +180,11 @@ impl Handover<'_> {
     fn estimated(&self, arm: &WrittenArm<'_>) -> HandedOver {
         let SearchContext { subject, options, .. } = self.search.context;
         let (nominal, rows) = (subject.nominal, &subject.observed.dataset);
-        let [fitted, handed] = &[arm.fitted, arm.with_uncertain].map(|fit| self.widened(fit));
+        let [fitted, mut handed] = [arm.fitted, arm.with_uncertain].map(|fit| self.widened(fit));
+        if let Some(with_sensor) = arm.with_sensor {
+            add_shift(&mut handed, arm.fitted, with_sensor);
+        }
+        let (fitted, handed) = (&fitted, &handed);
         let beyond_noise = self.beyond_noise_of(arm);
         let mut estimated = self.without_verdict(fitted, handed, arm.errors, beyond_noise);
         // What the written arm lacks of the causes stands in its covariance: only what all of them leave comes on top.
@@ -349,13 +359,37 @@ fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Dis
     if better(&plain.errors) { found } else { plain }
 }
 
-/// The certain model, or, with the probability, the same fitted without the causes of the measurement if these make a worse arm too
-/// probable.
+/// A fit with the causes of the measurement that is not written.
+struct LeftOut {
+    fit: Extended,
+    /// That it is worse than the one that is written.
+    probability: f64,
+}
+
+/// Adds to the covariance of a fit how far its links and frames would be from the written ones with the causes of the measurement: these are
+/// likely to be right, if not likely enough.
+fn add_shift(handed: &mut Fitted, written: &Extended, with_sensor: &Extended) {
+    let value = |fit: &Extended, parameter: &Parameter| {
+        let index = fit.parameters.iter().position(|other| other == parameter)?;
+        Some(fit.x[index])
+    };
+    let shift = |parameter: &Parameter| {
+        let geometric = Some(parameter).filter(|parameter| !parameter.is_of_cause())?;
+        Some(value(with_sensor, geometric)? - value(written, geometric)?)
+    };
+    let shifts = handed.parameters.iter().map(|parameter| shift(parameter).unwrap_or(0.0));
+    let shift = DVector::from_iterator(handed.parameters.len(), shifts);
+    if let Some(covariance) = &mut handed.estimate.covariance {
+        *covariance += &shift * shift.transpose();
+    }
+}
+
+/// The certain model, or the same fitted without the causes of the measurement if these make a worse arm too probable.
 fn without_measurement_causes(
     search: &Search<'_>,
     certain: WrittenFit,
     discrepancy: Option<&Discrepancy>,
-) -> (WrittenFit, Option<f64>) {
+) -> (WrittenFit, Option<LeftOut>) {
     let of_the_arm: Vec<Cause> =
         certain.fit.causes.iter().filter(|cause| matches!(cause, Cause::Arm(_))).cloned().collect();
     if of_the_arm.len() == certain.fit.causes.len() && time_discrepancy(discrepancy).is_none() {
@@ -368,7 +402,8 @@ fn without_measurement_causes(
     let beside = in_doubt::with_zero_causes(&without, certain.fit.clone());
     match probability_worse(&certain.fit, &beside, &median_condition(dataset), &samples) {
         Some(probability) if probability > sensor_causes::MOST_PROBABILITY => {
-            (WrittenFit { errors: search.validation.stage(&without), fit: without }, Some(probability))
+            let written = WrittenFit { errors: search.validation.stage(&without), fit: without };
+            (written, Some(LeftOut { fit: certain.fit, probability }))
         }
         _ => (certain, None),
     }

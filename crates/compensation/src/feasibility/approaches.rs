@@ -99,6 +99,9 @@ impl<'a> Starts<'a> {
     ) -> Vec<(u32, OutcomeReason)> {
         let mut found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
         let mut cuts_found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
+        if !self.any_left(blocking_reason) {
+            return Vec::new();
+        }
         // In the order of the text, in which nearly every motion stands behind its start.
         for _ in 0..PASSES {
             let before = found.len();
@@ -120,8 +123,8 @@ impl<'a> Starts<'a> {
                             Some(reason).filter(|_| is_refused || self.is_on_part(start))
                         }
                     };
-                    let may_be_wedge = self.may_be_wedge(start, index) && !self.is_drawn_back(start);
-                    let Some(reason) = uncorrected.filter(|_| may_be_wedge) else { return };
+                    let may_be_wedge = || self.may_be_wedge(start, index) && !self.is_drawn_back(start);
+                    let Some(reason) = uncorrected.filter(|_| may_be_wedge()) else { return };
                     let line = self.listing.motions[start as usize].place.line;
                     if wedge.is_none() && shift.exceeds(start, unknown) {
                         wedge = Some(OutcomeReason::PartOfCut { line, because: reason.kind() });
@@ -147,7 +150,9 @@ impl<'a> Starts<'a> {
         blocking_reason: Obstacle<'_>,
         shift: &Shift<'_>,
     ) -> Vec<(u32, OutcomeReason)> {
-        // The motions with an uncorrected place on the part before them are few, the others need no list of what follows them.
+        if !self.any_left(blocking_reason) {
+            return Vec::new();
+        }
         let mut found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
         for index in 0..self.listing.motions.len() as u32 {
             if self.is_path(index) && !self.is_drawn_back(index) || blocking_reason(index).is_some() {
@@ -174,6 +179,18 @@ impl<'a> Starts<'a> {
             }
         }
         found.into_iter().collect()
+    }
+
+    /// Whether a motion remains unmodified from whose end another might lead on: most programs have none.
+    fn any_left(&self, blocking_reason: Obstacle<'_>) -> bool {
+        let motions = (0..self.listing.motions.len() as u32).into_par_iter().with_min_len(MANY);
+        motions.any(|index| {
+            blocking_reason(index).is_some_and(|(status, reason)| {
+                status == Status::Refused
+                    || matches!(reason, OutcomeReason::Risk { .. })
+                    || self.meets_part(index)
+            })
+        })
     }
 
     fn is_path(&self, index: u32) -> bool {

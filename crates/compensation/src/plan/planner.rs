@@ -480,7 +480,12 @@ fn plan_motion<'a>(
         let deviation = outcome.path_deviation_mm.get();
         outcome.path_deviation_mm = deviation.map_or(corner, |deviation| deviation.max(corner)).into();
         if !(corner <= options.tolerance_mm) {
-            flag = flag.or(Some(OutcomeReason::CornerDeviation { mm: corner }));
+            // Of the line and the corner before it the worse is named.
+            let is_worse =
+                flag.is_none_or(|flag| matches!(flag, OutcomeReason::PathDeviation { mm } if mm < corner));
+            if is_worse {
+                flag = Some(OutcomeReason::CornerDeviation { mm: corner });
+            }
         }
     }
     let flag =

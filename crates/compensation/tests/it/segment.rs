@@ -20,7 +20,7 @@ use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::Listing;
 use truegrind_programs::rapid::Task;
-use truegrind_programs::rewrite::RewriteOptions;
+use truegrind_programs::rewrite::{NewTarget, RewriteOptions};
 
 use super::{estimated, nominal, perturbed};
 
@@ -172,25 +172,43 @@ fn a_rounded_corner_is_checked_along_its_parabola() {
     );
 }
 
+/// Targets were inserted half-way to a rounded corner: they cut its zone short, and bent the path by more than they straightened the line.
 #[test]
-fn a_zone_that_inserted_targets_cut_short_is_flagged() {
+fn inserted_targets_keep_clear_of_rounded_corners() {
     let known = known(&perturbed(5, 3.0));
-    let source = module(&format!(
-        "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,z200,tool0;\n  MoveL {},v100,fine,tool0;\n",
-        down(250.0, -230.0, 320.0),
-        down(420.0, -230.0, 320.0),
-        down(420.0, 230.0, 320.0)
-    ));
-    let (planned, _) = rewrite(&source, &known, &Options { tolerance_mm: 5.0, ..Options::default() });
-    assert_eq!(planned.outcomes[2].reason(), None, "{:?}", planned.outcomes);
-    let (planned, _) = rewrite(&source, &known, &Options { tolerance_mm: 0.005, ..Options::default() });
-    let outcome = &planned.outcomes[2];
-    assert!(outcome.inserted > 0, "{outcome:?}");
-    assert!(
-        matches!(outcome.reason(), Some(OutcomeReason::CornerDeviation { mm }) if mm > 1.0),
-        "{outcome:?}"
-    );
-    assert_eq!(outcome.status, Status::Flagged);
+    let source = |zone: &str| {
+        module(&format!(
+            "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,{zone},tool0;\n  MoveL {},v100,fine,tool0;\n",
+            down(250.0, -230.0, 320.0),
+            down(420.0, -230.0, 320.0),
+            down(420.0, 230.0, 320.0)
+        ))
+    };
+    let planned = |zone: &str, tolerance_mm: f64| {
+        let options = Options { tolerance_mm, ..Options::default() };
+        rewrite(&source(zone), &known, &options).0
+    };
+    assert_eq!(planned("z200", 5.0).outcomes[2].reason(), None);
+    let rounded = planned("z200", 0.005);
+    // The corner's zone reaches half-way into the first line: there is no place for a target.
+    assert_eq!(rounded.outcomes[1].inserted, 0, "{:?}", rounded.outcomes[1]);
+    let Some(OutcomeReason::PathDeviation { mm }) = rounded.outcomes[1].reason() else {
+        panic!("{:?}", rounded.outcomes[1])
+    };
+    assert!(mm > 0.05 && mm < 0.5, "{mm}");
+    // And 85 mm into the second one, so that targets begin at 170 mm of 460; the correction moves them by up to 7 mm.
+    assert!(rounded.outcomes[2].inserted > 0, "{:?}", rounded.outcomes[2]);
+    let inserted = &rounded.changes.iter().find(|change| change.motion == 2).unwrap().before;
+    for extra in inserted {
+        let NewTarget::Cartesian { position_mm, .. } = extra.target else { panic!("{extra:?}") };
+        assert!(position_mm[1] > -230.0 + 155.0, "{position_mm:?}");
+    }
+    let corner_mm = rounded.outcomes[2].path_deviation_mm.get().unwrap();
+    assert!(corner_mm < 0.5, "{corner_mm}");
+    // Without a zone they stand wherever they are needed.
+    let sharp = planned("fine", 0.005);
+    assert!(sharp.outcomes[1].inserted > 0 && sharp.outcomes[2].inserted > rounded.outcomes[2].inserted);
+    assert!(sharp.outcomes.iter().all(|outcome| outcome.status == Status::Changed), "{:?}", sharp.outcomes);
 }
 
 // ---- speed ----
