@@ -121,7 +121,7 @@ pub fn compensate_prepared(
             refused.entry(motion).or_insert(reason);
         }
         round += 1;
-        if round >= MOST_ROUNDS {
+        if round >= MAX_ROUNDS {
             // Every round removed more motions, so the whole program remains unmodified.
             for change in &planned.changes {
                 refused.entry(change.motion).or_insert(OutcomeReason::NoConsistentPlan);
@@ -167,7 +167,7 @@ fn air_moves_alone(listing: &Listing, planned: &Plan) -> Vec<u32> {
 }
 
 /// Rounds of planning and writing before every remaining change is refused.
-const MOST_ROUNDS: usize = 16;
+const MAX_ROUNDS: usize = 16;
 
 /// The plan, reconciled with what was written.
 fn agreed(

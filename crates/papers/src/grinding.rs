@@ -125,8 +125,8 @@ impl GrindingRow {
 }
 
 /// Bounds of a correction (mm, rad), far above those of `compensate` (10 mm, 2°).
-const LARGEST_CORRECTION_MM: f64 = 100.0;
-const LARGEST_TURN_RAD: f64 = 0.35;
+const MAX_CORRECTION_MM: f64 = 100.0;
+const MAX_TURN_RAD: f64 = 0.35;
 
 /// The arm that grinds.
 #[derive(Debug, Clone, Copy)]
@@ -355,8 +355,8 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
     // centimetres; the wide bounds let such corrections pass, so that their consequence is measured.
     let bounds = RewriteBounds {
         condition: shop.condition,
-        max_correction_mm: LARGEST_CORRECTION_MM,
-        max_rotation_rad: LARGEST_TURN_RAD,
+        max_correction_mm: MAX_CORRECTION_MM,
+        max_rotation_rad: MAX_TURN_RAD,
         cuts: Cuts::Single,
         joint_gain: f64::INFINITY,
         placement: Placement::Absolute,

@@ -79,7 +79,7 @@ impl PartialEq for Edits {
 impl Eq for Edits {}
 
 /// Edits applied by one thread at a time.
-const PORTION: usize = 1 << 15;
+const CHUNK: usize = 1 << 15;
 
 impl Edits {
     /// No edits.
@@ -259,7 +259,7 @@ impl Edits {
             sorted
                 .parts
                 .iter()
-                .flat_map(|part| part.entries.chunks(PORTION).map(|entries| (entries, &part.text)))
+                .flat_map(|part| part.entries.chunks(CHUNK).map(|entries| (entries, &part.text)))
         };
         let mut portions: Vec<(usize, usize)> = Vec::new();
         let mut last = 0..0;

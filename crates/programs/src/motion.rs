@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub use axis_turn::AxisTurn;
 pub use reason::{OpaqueReason, Reason};
 use smallvec::SmallVec;
-pub use target::{FARTHEST_MM, Frame, JointTarget, RobTarget, TargetValue};
+pub use target::{Frame, JointTarget, MAX_POSITION_MM, RobTarget, TargetValue};
 
 /// A range of bytes of one file, end excluded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]

@@ -16,7 +16,7 @@ use crate::measurement::dataset::Sensor;
 pub const DIAGNOSIS_FILE: &str = "DIAGNOSIS.json";
 
 /// Share below which a rival is beaten and not listed.
-const LEAST_SHARE: f64 = 0.01;
+const MIN_SHARE: f64 = 0.01;
 
 /// Effects that poses, repeats, both sides of approach or visits over time decide: those that `plan` has questions for.
 pub const DECIDED_BY_POSES: [CauseKind; 10] = [
@@ -99,7 +99,7 @@ pub fn members(finding: &Finding) -> Vec<Member> {
     out.iter_mut().zip(&logs).for_each(|(member, log)| member.share = (log - most).exp() / total);
     let named = (out[0].effect, out[0].joints.clone(), out[0].family);
     let is_named = |m: &Member| (&m.effect, &m.joints, m.family) == (&named.0, &named.1, named.2);
-    out.retain(|member| member.share >= LEAST_SHARE || is_named(member));
+    out.retain(|member| member.share >= MIN_SHARE || is_named(member));
     out.sort_by(|a, b| b.share.total_cmp(&a.share));
     let kept: f64 = out.iter().map(|member| member.share).sum();
     out.iter_mut().for_each(|member| member.share /= kept);

@@ -96,7 +96,7 @@ fn robust_weight_of(size: f64) -> f64 {
 
 /// Smallest standard deviation of a reading (mm, rad). With fewer rows than parameters the residual is 0; unbounded weights would then
 /// overwhelm the priors.
-const LEAST_SIGMA: (f64, f64) = (1e-3, 1e-6);
+const MIN_SIGMA: (f64, f64) = (1e-3, 1e-6);
 
 /// Convergence tolerance of fits within a search, in χ²/2 for each scalar row: the linearisation absorbs the rest, and merits are
 /// compared in units of χ².
@@ -255,8 +255,8 @@ pub(super) fn warm_fit(
                 .iter()
                 .zip(by_length.iter().zip(&by_angle))
                 .map(|(w, (length, angle))| Weight {
-                    per_mm: (w.per_mm / length).min(LEAST_SIGMA.0.recip()),
-                    per_rad: (w.per_rad / angle).min(LEAST_SIGMA.1.recip()),
+                    per_mm: (w.per_mm / length).min(MIN_SIGMA.0.recip()),
+                    per_rad: (w.per_rad / angle).min(MIN_SIGMA.1.recip()),
                 })
                 .collect();
             let problem = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
@@ -435,7 +435,7 @@ fn updated_sigma(sigma: f64, spread: f64, base: &[Weight], lengths: bool) -> f64
     let of = |w: &Weight| if lengths { w.per_mm } else { w.per_rad };
     let total = median(&base.iter().map(|w| 1.0 / of(w).powi(2)).collect::<Vec<_>>()).unwrap_or(1.0);
     let share = (total - sigma * sigma).max(0.0);
-    let smallest = if lengths { LEAST_SIGMA.0 } else { LEAST_SIGMA.1 };
+    let smallest = if lengths { MIN_SIGMA.0 } else { MIN_SIGMA.1 };
     (total * spread * spread - share).max(0.01 * sigma * sigma).sqrt().max(smallest)
 }
 

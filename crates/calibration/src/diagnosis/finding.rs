@@ -447,7 +447,7 @@ impl TryFrom<String> for NoiseFloorSource {
 }
 
 /// Multiple of the noise floor from which an error is not taken for noise.
-const NOT_NOISE: f64 = 3.0;
+const NOISE_FLOORS_OF_AN_ERROR: f64 = 3.0;
 
 /// Where only rounding is known, the error (mm) that is still taken for noise of the sensor: several times that of a laser tracker or a
 /// camera.
@@ -455,5 +455,5 @@ const NOISE_OF_A_SENSOR_MM: f64 = 0.15;
 
 /// Whether an error is too large for noise of sensor and arm; `measured`: by repeated poses.
 pub(super) fn too_much_for_noise(error_mm: f64, floor_mm: f64, measured: bool) -> bool {
-    error_mm > NOT_NOISE * floor_mm && (measured || error_mm > NOISE_OF_A_SENSOR_MM)
+    error_mm > NOISE_FLOORS_OF_AN_ERROR * floor_mm && (measured || error_mm > NOISE_OF_A_SENSOR_MM)
 }

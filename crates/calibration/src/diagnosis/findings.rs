@@ -8,7 +8,7 @@ use super::candidates::Scored;
 use super::catalogue::{Candidate, LoggedColumns};
 use super::cause::{Cause, MAP_KNOTS};
 use super::cause_kind::CauseKind;
-use super::confirmation::CLEAR;
+use super::confirmation::CLEAR_TWICE_LOG_BF;
 use super::decision;
 use super::design::{Design, FullDesign};
 use super::drift;
@@ -306,7 +306,7 @@ fn same_readings(cause: &Cause) -> Option<CauseKind> {
 
 /// Whether a finding clearly beats a rival; `after_mm` is the held-out error with the finding.
 fn is_beaten(rival: &Alternative, after_mm: f64) -> bool {
-    rival.beaten_by >= CLEAR && !(rival.cv_rmse_mm < BETTER * after_mm)
+    rival.beaten_by >= CLEAR_TWICE_LOG_BF && !(rival.cv_rmse_mm < BETTER * after_mm)
 }
 
 /// Whether a spring of the arm is certain and only its place is not: every rival that might be true is another spring, a link or a joint.

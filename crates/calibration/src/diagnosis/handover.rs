@@ -99,7 +99,7 @@ impl Handover<'_> {
                 "the written arm was fitted without the causes in the measurement, which might make its links worse (probability \
                  {:.0} %, at most {:.0} % are allowed)",
                 100.0 * probability,
-                100.0 * sensor_causes::MOST_PROBABILITY
+                100.0 * sensor_causes::MAX_PROBABILITY
             )
         }));
         let with_uncertain = with_uncertain_causes(search, &fit, discrepancy);
@@ -367,7 +367,7 @@ fn without_measurement_causes(
     let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
     let beside = in_doubt::with_zero_causes(&without, certain.fit.clone());
     match probability_worse(&certain.fit, &beside, &median_condition(dataset), &samples) {
-        Some(probability) if probability > sensor_causes::MOST_PROBABILITY => {
+        Some(probability) if probability > sensor_causes::MAX_PROBABILITY => {
             (WrittenFit { errors: search.validation.stage(&without), fit: without }, Some(probability))
         }
         _ => (certain, None),

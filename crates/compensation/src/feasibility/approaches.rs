@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::cut::{CutsOf, Obstacle, StartsOf, follows_position, may_cut};
 use crate::deviation::Status;
 use crate::plan::reason::OutcomeReason;
-use crate::search_budget::MANY;
+use crate::search_budget::MANY_MOTIONS;
 use truegrind_programs::motion::{Listing, Motion, MotionKind};
 
 /// The starts of the lines and arcs of a program.
@@ -64,7 +64,7 @@ impl<'a> Starts<'a> {
         shift: &Shift<'_>,
     ) -> Vec<(u32, OutcomeReason)> {
         let is_left = |index: u32| blocking_reason(index).is_some();
-        let motions = (0..self.listing.motions.len() as u32).into_par_iter().with_min_len(MANY);
+        let motions = (0..self.listing.motions.len() as u32).into_par_iter().with_min_len(MANY_MOTIONS);
         let mut open: Vec<u32> = motions.filter(|index| self.is_path(*index) && is_left(*index)).collect();
         let mut found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
         let mut cuts_found = BTreeSet::new();

@@ -35,7 +35,7 @@ pub(crate) fn unchanged_motions(
     // For segments that start where another motion remains unmodified, over all rounds.
     let mut budget = SearchBudget::of(search_budget::WAYS);
     let mut forbidden = forbid_segments(listing, solved, frame_table, arms, options, None, &mut budget);
-    let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
+    let mut rounds = (MAX_VISITS / listing.motions.len().max(1)).clamp(MIN_ROUNDS, MAX_ROUNDS);
     // Lines of NC programs have no stops, and their air moves are judged once they are written.
     let has_starts = !listing.numbered && options.cuts != Cuts::Single;
     let starts = has_starts.then(|| Starts::of(listing, cuts, options.cuts == Cuts::Whole));
@@ -84,11 +84,11 @@ pub(crate) fn unchanged_motions(
 }
 
 /// Motions visited over all rounds.
-const MOST_VISITS: usize = 4_000_000;
+const MAX_VISITS: usize = 4_000_000;
 /// Smallest number of rounds.
-const FEWEST_ROUNDS: usize = 16;
+const MIN_ROUNDS: usize = 16;
 /// Largest number of rounds: otherwise cut after cut could be pinned, each by the previous one.
-const MOST_ROUNDS: usize = 1000;
+const MAX_ROUNDS: usize = 1000;
 const ABANDONED: OutcomeReason = OutcomeReason::Inverse(InverseError::Abandoned);
 
 /// Why a motion remains unmodified: first what the text leaves open, then what no arm reaches; `None` where it is corrected.

@@ -52,15 +52,15 @@ pub(super) fn planned(job: &Planner<'_>) -> Plan {
     let count = listing.motions.len();
     let whole = SearchBudget::of(search_budget::PATHS).with_near_solves(search_budget::path_steps(count));
     // Filled in place: concatenating per-portion lists would hold everything twice.
-    let motions = (0..count as u32).into_par_iter().with_min_len(search_budget::MANY);
+    let motions = (0..count as u32).into_par_iter().with_min_len(search_budget::MANY_MOTIONS);
     let mut outcomes: Vec<MotionOutcome> = motions.clone().map(MotionOutcome::left).collect();
     let mut changes: Vec<Option<Change>> = motions.map(|_| None).collect();
     let mut slots: Vec<OutputSlots<'_>> =
-        outcomes.chunks_mut(search_budget::PORTION).zip(changes.chunks_mut(search_budget::PORTION)).collect();
+        outcomes.chunks_mut(search_budget::CHUNK).zip(changes.chunks_mut(search_budget::CHUNK)).collect();
     let portions: Vec<PortionResult> =
         search_budget::shared_out_into(whole, &mut slots, |portion, slots, budget| {
-            let first = portion * search_budget::PORTION;
-            job.portion(first..(first + search_budget::PORTION).min(count), slots, budget)
+            let first = portion * search_budget::CHUNK;
+            job.portion(first..(first + search_budget::CHUNK).min(count), slots, budget)
         });
     let mut notes = frame_table.notes();
     notes.extend(backlash_note(arms, solved));

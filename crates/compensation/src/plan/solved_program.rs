@@ -32,10 +32,10 @@ use truegrind_programs::motion::{Listing, MotionKind};
 use crate::plan::planner::{Planner, planned};
 
 /// Largest number of rounds in which lines are refused that joints do not follow.
-const MOST_LINE_ROUNDS: usize = 16;
+const MAX_LINE_ROUNDS: usize = 16;
 
 /// Largest number of rounds in which unmodified motions change the backlash sides of later ones.
-const MOST_UNCHANGED_ROUNDS: usize = 64;
+const MAX_UNCHANGED_ROUNDS: usize = 64;
 
 /// Plans the rewrite of a program.
 ///
@@ -106,7 +106,7 @@ impl<'a> SolvedProgram<'a> {
     pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
         let mut refused = refused.clone();
         // A line that joints do not follow is known only with its inserted targets; refusing it may change what lies behind it.
-        for _ in 0..MOST_LINE_ROUNDS {
+        for _ in 0..MAX_LINE_ROUNDS {
             let plan = self.plan_without(&refused);
             let off = lines_off_as_joints(self.listing, &plan, self.options);
             if off.is_empty() {
@@ -173,7 +173,7 @@ impl<'a> SolvedProgram<'a> {
         for (motion, why) in assessment.risky() {
             refused.entry(motion).or_insert(why);
         }
-        for _ in 0..MOST_UNCHANGED_ROUNDS {
+        for _ in 0..MAX_UNCHANGED_ROUNDS {
             if let Some(program) = program
                 && refused != *solved_unchanged
             {

@@ -78,7 +78,7 @@ struct TargetSolver<'a, 't> {
 const ROUNDS: usize = 4;
 
 /// Largest number of iterations.
-const MOST_ROUNDS: usize = 24;
+const MAX_ROUNDS: usize = 24;
 
 impl<'t> TargetSolver<'_, 't> {
     fn solve(self, arms: &mut Arms<'_>) -> SolvedTargets<'t> {
@@ -104,7 +104,7 @@ impl<'t> TargetSolver<'_, 't> {
         let mut condition_indices = before.clone();
         let mut targets = self.unsolved();
         self.fill(&mut targets, arms, &before, &condition_indices, None);
-        for round in 1..=MOST_ROUNDS {
+        for round in 1..=MAX_ROUNDS {
             let next = self.sides(arms, Some(&targets), &unknown_sides);
             if round > ROUNDS {
                 // A side that still alternates counts as unknown.
@@ -118,7 +118,7 @@ impl<'t> TargetSolver<'_, 't> {
                 break;
             }
             let stale: Vec<bool> = (0..count)
-                .step_by(search_budget::PORTION)
+                .step_by(search_budget::CHUNK)
                 .map(|begin| {
                     let targets = self.targets(begin);
                     new[targets.clone()] != condition_indices[targets]
@@ -164,7 +164,7 @@ impl<'t> TargetSolver<'_, 't> {
         };
         (0..self.listing.motions.len())
             .into_par_iter()
-            .with_min_len(search_budget::MANY)
+            .with_min_len(search_budget::MANY_MOTIONS)
             .filter_map(originals)
             .collect()
     }
@@ -177,13 +177,14 @@ impl<'t> TargetSolver<'_, 't> {
                 .flatten()
                 .any(|original| original.guess == BranchGuess::Guessed)
         };
-        let motions = (0..self.listing.motions.len()).into_par_iter().with_min_len(search_budget::MANY);
+        let motions =
+            (0..self.listing.motions.len()).into_par_iter().with_min_len(search_budget::MANY_MOTIONS);
         motions.filter(guessed).map(|m| m as u32).collect()
     }
 
     /// The targets of the portion that begins with a motion.
     fn targets(&self, begin: usize) -> std::ops::Range<usize> {
-        self.ranges.of_motions(begin..(begin + search_budget::PORTION).min(self.listing.motions.len()))
+        self.ranges.of_motions(begin..(begin + search_budget::CHUNK).min(self.listing.motions.len()))
     }
 
     /// One slot per target.
@@ -202,7 +203,7 @@ impl<'t> TargetSolver<'_, 't> {
     ) {
         let mut rest = solved;
         let mut portions: Vec<&mut [Result<SolvedTarget<'t>, OutcomeReason>]> = Vec::new();
-        for begin in (0..self.listing.motions.len()).step_by(search_budget::PORTION) {
+        for begin in (0..self.listing.motions.len()).step_by(search_budget::CHUNK) {
             let (here, after) = rest.split_at_mut(self.targets(begin).len());
             portions.push(here);
             rest = after;
@@ -213,7 +214,7 @@ impl<'t> TargetSolver<'_, 't> {
                 return;
             }
             reserve_memory();
-            let targets = self.targets(portion * search_budget::PORTION);
+            let targets = self.targets(portion * search_budget::CHUNK);
             let condition_indices = [&before[targets.clone()], &condition_indices[targets.clone()]];
             let (target_refs, originals) = (&self.target_refs[targets.clone()], &self.originals[targets]);
             with_budget(budget, || {

@@ -76,7 +76,7 @@ struct Labels {
 const BESIDE: f64 = 0.55;
 const CHARACTER: f64 = 0.0095;
 /// Farther from the middle a label leaves the view.
-const FARTHEST: f64 = 0.7;
+const MAX_FROM_MIDDLE: f64 = 0.7;
 /// How much a label is lifted, over how far it goes sideways.
 const LIFTED: f64 = 0.8;
 /// Labels are about so long, over the size of the cut.
@@ -94,7 +94,8 @@ impl Labels {
         let beside = (intended(point) - self.middle).try_normalize(1e-9).unwrap_or_else(Vector3::z);
         // Lifted, since a view is wider than high and a label beside the path would end beyond its edge.
         let lifted = |side: Vector3<f64>| (side + LIFTED * Vector3::z()).try_normalize(1e-9).unwrap_or(side);
-        let distance = (BESIDE + CHARACTER * label.chars().count() as f64).min(FARTHEST) * self.size_mm;
+        let distance =
+            (BESIDE + CHARACTER * label.chars().count() as f64).min(MAX_FROM_MIDDLE) * self.size_mm;
         let positions =
             [lifted(beside), lifted(-beside), Vector3::z()].map(|away| self.middle + away * distance);
         let far = |a: &Point3<f64>, b: &Point3<f64>| (a - b).norm() >= LABEL_LENGTH * self.size_mm;

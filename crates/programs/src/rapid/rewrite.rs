@@ -21,7 +21,7 @@ use crate::motion::{Motion, MotionKind, Offset, Origin, Reason, Span, TargetValu
 use crate::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
 
 /// Changes that one thread processes at a time.
-const PORTION: usize = 1024;
+const CHUNK: usize = 1024;
 
 /// Greatest length of a data name.
 const NAME_LENGTH: usize = 32;
@@ -52,7 +52,7 @@ impl Task<'_> {
 
     /// Whether none of the changes would be refused.
     pub fn accepts(&self, changes: &[Change]) -> bool {
-        changes.par_iter().with_min_len(PORTION).all(|change| {
+        changes.par_iter().with_min_len(CHUNK).all(|change| {
             let motion = self.listing.motions.get(change.motion as usize);
             // Whether persistent targets can be edited in place depends on the other changes.
             let is_accepted = |motion: &Motion| {
@@ -218,7 +218,7 @@ impl<'r, 's> Rewriter<'r, 's> {
     fn in_place(&mut self, changes: &[Change]) -> (Vec<Outcome>, UpdatesByDeclaration, Vec<TargetUpdate>) {
         let (task, options) = (self.task, self.options);
         let portions: Vec<_> = changes
-            .par_chunks(PORTION)
+            .par_chunks(CHUNK)
             .enumerate()
             .map(|(portion, changes)| {
                 let mut part = Rewriter::new(task, options);
@@ -227,7 +227,7 @@ impl<'r, 's> Rewriter<'r, 's> {
                     *edits = Edits::with_capacity(changes.len(), 80 * changes.len());
                 }
                 let (mut updates, mut computed) = (UpdatesByDeclaration::new(), Vec::new());
-                let outcomes: Vec<Outcome> = (portion * PORTION..)
+                let outcomes: Vec<Outcome> = (portion * CHUNK..)
                     .zip(changes)
                     .map(|(index, change)| match task.listing.motions.get(change.motion as usize) {
                         None => Outcome::Refused(Reason::MissingArgument),

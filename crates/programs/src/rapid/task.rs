@@ -198,7 +198,7 @@ struct Literal {
 }
 
 /// Motions into which one thread inserts literals at a time.
-const PORTION: usize = 4096;
+const CHUNK: usize = 4096;
 
 /// Greatest call depth to which the exit states of routines are computed; beyond it they may be anything that the routine sets.
 const CALL_DEPTH: u32 = 12;
@@ -308,11 +308,11 @@ impl<'a, 's> ListingBuilder<'a, 's> {
     /// Inserts the targets that are written in the instructions as numbers.
     fn insert_literals(&mut self, read: &Literals) {
         let (literals, trees, symbols) = (std::mem::take(&mut self.literals), self.trees, self.symbols);
-        let portions = self.listing.motions.par_chunks_mut(PORTION).enumerate();
+        let portions = self.listing.motions.par_chunks_mut(CHUNK).enumerate();
         portions.for_each(|(portion, motions)| {
             let evaluator = Evaluator::new(trees, symbols);
             // They are in the order of motions.
-            let begin = portion * PORTION;
+            let begin = portion * CHUNK;
             let from = literals.partition_point(|literal| (literal.motion as usize) < begin);
             let mut last = 0;
             for literal in &literals[from..] {

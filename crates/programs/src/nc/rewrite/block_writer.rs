@@ -197,5 +197,5 @@ fn decimals(text: &[u8]) -> u8 {
         return 0;
     }
     let point = text.iter().position(|byte| matches!(byte, b'.' | b','));
-    point.map_or(0, |point| (text.len() - point - 1).min(usize::from(number::MOST_DECIMALS)) as u8)
+    point.map_or(0, |point| (text.len() - point - 1).min(usize::from(number::MAX_DECIMALS)) as u8)
 }

@@ -59,7 +59,7 @@ impl UnitFacts {
 }
 
 /// Nodes that one thread processes at a time.
-const PORTION: u32 = 1 << 16;
+const CHUNK: u32 = 1 << 16;
 
 impl Symbols {
     /// The facts of every unit.
@@ -67,14 +67,13 @@ impl Symbols {
         let facts = |&unit: &Unit| {
             let nodes = unit.node + 1..trees[unit.file as usize].nodes.subtree_end(unit.node);
             // The parts of a long routine in parallel; a fragment skips whole routines, so it stays in one piece.
-            let parts =
-                if unit.routine.is_some() { nodes.len().div_ceil(PORTION as usize).max(1) } else { 1 };
+            let parts = if unit.routine.is_some() { nodes.len().div_ceil(CHUNK as usize).max(1) } else { 1 };
             if parts == 1 {
                 return self.facts_of(trees, unit, nodes);
             }
             let part = |index: usize| {
-                let first = nodes.start + index as u32 * PORTION;
-                self.facts_of(trees, unit, first..(first + PORTION).min(nodes.end))
+                let first = nodes.start + index as u32 * CHUNK;
+                self.facts_of(trees, unit, first..(first + CHUNK).min(nodes.end))
             };
             let mut parts: Vec<UnitFacts> = (0..parts).into_par_iter().map(part).collect();
             let rest = parts.split_off(1);
@@ -262,8 +261,8 @@ pub(crate) fn is_resuming_handler(tree: &RapidTree<'_>, clause: u32) -> bool {
 /// Whether anything in the files has the name of GripLoad or of the option TLoad.
 pub(super) fn name_loads(trees: &[RapidTree<'_>]) -> bool {
     trees.iter().any(|tree| {
-        tree.kinds().par_chunks(PORTION as usize).enumerate().any(|(portion, kinds)| {
-            let names = (portion as u32 * PORTION..).zip(kinds).filter(|(_, kind)| **kind == Token::Ident);
+        tree.kinds().par_chunks(CHUNK as usize).enumerate().any(|(portion, kinds)| {
+            let names = (portion as u32 * CHUNK..).zip(kinds).filter(|(_, kind)| **kind == Token::Ident);
             let mut texts = names.map(|(token, _)| tree.text(token));
             texts.any(|text| same_name(text, b"GripLoad") || same_name(text, b"TLoad"))
         })

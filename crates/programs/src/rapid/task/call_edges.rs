@@ -15,7 +15,7 @@ use crate::rapid::symbol::{Symbols, Unit};
 const ELSEWHERE: u32 = u32::MAX;
 
 /// Motions with more before them have no list of them.
-const MOST_PREDECESSORS: usize = 64;
+const MAX_PREDECESSORS: usize = 64;
 
 /// A call of a routine that moves, or of any in a list. Behind the units come the lists of routines that computed names may call.
 #[derive(Debug)]
@@ -326,14 +326,14 @@ impl<'c> Graph<'c> {
                         let last = &self.last[node as usize].0;
                         let known = last.iter().filter(|before| **before != ELSEWHERE);
                         out.extend(known.map(|before| [*before, *motion]));
-                        if *branched && all.0.len() <= MOST_PREDECESSORS {
+                        if *branched && all.0.len() <= MAX_PREDECESSORS {
                             all.0.extend(last);
                         }
                     }
                 }
             }
             all.normalise();
-            if *branched && !all.0.contains(&ELSEWHERE) && (1..=MOST_PREDECESSORS).contains(&all.0.len()) {
+            if *branched && !all.0.contains(&ELSEWHERE) && (1..=MAX_PREDECESSORS).contains(&all.0.len()) {
                 predecessors.insert(*motion, all.0);
             }
         }

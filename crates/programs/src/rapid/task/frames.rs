@@ -7,7 +7,7 @@ use crate::rapid::evaluate::{Context, Known};
 use crate::rapid::symbol::{SymbolKind, Unit};
 use crate::rapid::syntax::{text_of, tokens_of};
 use crate::rapid::token::{Token, display};
-use crate::rapid::value::{LARGEST, Value, built_in};
+use crate::rapid::value::{MAX_NUM, Value, built_in};
 use crate::tree::Child;
 
 impl<'s> ListingBuilder<'_, 's> {
@@ -51,7 +51,7 @@ impl<'s> ListingBuilder<'_, 's> {
     ) -> u32 {
         let mut speed = self.listing.speeds[speed as usize].clone();
         match (&mut speed.value, self.evaluated(unit, state, velocity).number()) {
-            (speed @ Ok(_), Ok(velocity)) if !(velocity > 0.0 && velocity <= LARGEST) => {
+            (speed @ Ok(_), Ok(velocity)) if !(velocity > 0.0 && velocity <= MAX_NUM) => {
                 *speed = Err(Reason::NumberRange);
             }
             (Ok(value), Ok(velocity)) => value.tcp_mm_s = velocity,

@@ -13,7 +13,7 @@ use crate::motion::{MotionTarget, Origin, Role};
 use crate::tree::Child;
 
 /// Nodes that one thread processes at a time.
-const PORTION: u32 = 1 << 14;
+const CHUNK: u32 = 1 << 14;
 
 /// About as many nodes as a motion with its target written out has, or fewer.
 pub(super) const NODES_PER_MOTION: usize = 14;
@@ -34,7 +34,7 @@ impl Literals {
     /// Reads the literals in motion instructions.
     pub(super) fn of(trees: &[RapidTree<'_>], symbols: &Symbols) -> Self {
         let files = trees.par_iter().enumerate().map(|(file, tree)| {
-            let portions = 0..tree.nodes.len().div_ceil(PORTION);
+            let portions = 0..tree.nodes.len().div_ceil(CHUNK);
             portions.into_par_iter().map(|portion| read(trees, symbols, file as u32, portion)).collect()
         });
         Literals { read: files.collect() }
@@ -50,7 +50,7 @@ impl Literals {
         joints: bool,
         last: &mut usize,
     ) -> Option<MotionTarget> {
-        let portion = self.read.get(file as usize)?.get((call / PORTION) as usize)?;
+        let portion = self.read.get(file as usize)?.get((call / CHUNK) as usize)?;
         let next =
             [*last + 1, 0].into_iter().find(|at| portion.get(*at).is_some_and(|read| read.node == node));
         let at = next.or_else(|| portion.binary_search_by_key(&node, |read| read.node).ok())?;
@@ -62,9 +62,9 @@ impl Literals {
 fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> Vec<Read> {
     let tree = &trees[file as usize];
     let evaluator = Evaluator::new(trees, symbols);
-    let first = portion * PORTION;
-    let end = (first + PORTION).min(tree.nodes.len());
-    let mut out = Vec::with_capacity(PORTION as usize / NODES_PER_MOTION);
+    let first = portion * CHUNK;
+    let end = (first + CHUNK).min(tree.nodes.len());
+    let mut out = Vec::with_capacity(CHUNK as usize / NODES_PER_MOTION);
     for call in first..end {
         let found = tree.nodes.get(call);
         if found.kind != Syntax::Call {

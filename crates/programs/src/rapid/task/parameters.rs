@@ -18,7 +18,7 @@ pub(super) type HandedOver = HashMap<u32, u32>;
 type Arguments = Option<Vec<u32>>;
 
 /// Most symbols that the calls of a routine hand over; parameters of its callers among them.
-const MOST: usize = 4;
+const MAX_SYMBOLS: usize = 4;
 
 /// Most routines through which one argument is handed on.
 const DEPTH: usize = 6;
@@ -43,7 +43,7 @@ pub(super) fn of(trees: &[RapidTree<'_>], symbols: &Symbols, mains: &[u32]) -> H
                     let all = found.entry(parameter).or_insert_with(|| Some(Vec::new()));
                     match (data.filter(|_| is_alone), &mut *all) {
                         (Some(data), Some(known)) if known.contains(&data) => {}
-                        (Some(data), Some(known)) if known.len() < MOST => known.push(data),
+                        (Some(data), Some(known)) if known.len() < MAX_SYMBOLS => known.push(data),
                         _ => *all = None,
                     }
                 }
