@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::cell::Cell;
 use crate::condition::overload::{is_far_above_rating, stated_overload};
 use crate::cut::{Cuts, may_cut};
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::frames::taught::contradictions;
 use crate::frames::undeclared;
 use crate::options::{Emit, Options};
@@ -26,7 +26,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_programs::edit::EditError;
 use truegrind_programs::motion::{Listing, Mark, MotionKind, Reason};
 use truegrind_programs::reading::{Language, Program};
-use truegrind_programs::rewrite::{Outcome, RewriteOptions, Rewritten};
+use truegrind_programs::rewrite::{RewriteOptions, RewriteOutcome, Rewritten};
 
 /// A corrected program.
 #[derive(Debug, Clone, PartialEq)]
@@ -203,12 +203,12 @@ fn refusals(planned: &Plan, rewritten: &Rewritten, listing: &Listing) -> BTreeMa
     let outcomes = planned.changes.iter().zip(&rewritten.outcomes);
     let refused = outcomes.filter_map(|(change, outcome)| match outcome {
         // Rounded to the written decimals, the points make no circle.
-        Outcome::Refused(Reason::WrongShape)
+        RewriteOutcome::Refused(Reason::WrongShape)
             if listing.motions[change.motion as usize].kind == MotionKind::Circular =>
         {
             Some((change.motion, OutcomeReason::NoCircle))
         }
-        Outcome::Refused(reason) => Some((change.motion, OutcomeReason::Program(*reason))),
+        RewriteOutcome::Refused(reason) => Some((change.motion, OutcomeReason::Program(*reason))),
         _ => None,
     });
     refused.collect()
@@ -220,13 +220,13 @@ fn reconcile(planned: &mut Plan, rewritten: &Rewritten, refused: &BTreeMap<u32, 
         let row = &mut planned.outcomes[change.motion as usize];
         let open = [OutcomeReason::UnknownStart, OutcomeReason::UncheckedPath];
         let is_sound =
-            row.status == Status::Changed || row.reason().is_some_and(|reason| open.contains(&reason));
-        if *outcome == Outcome::Unchanged && is_sound {
-            row.status = Status::Left;
+            row.status == MotionStatus::Changed || row.reason().is_some_and(|reason| open.contains(&reason));
+        if *outcome == RewriteOutcome::Unchanged && is_sound {
+            row.status = MotionStatus::Left;
             row.reason = Some(Box::new(OutcomeReason::NoChange));
         }
         if let Some(reason) = refused.get(&change.motion) {
-            row.status = Status::Refused;
+            row.status = MotionStatus::Refused;
             row.reason = Some(Box::new(*reason));
             row.after_mm = row.before_mm;
         }

@@ -12,7 +12,7 @@
 
 use rayon::prelude::*;
 
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget::MANY_MOTIONS;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
@@ -201,7 +201,7 @@ fn stops(motion: &Motion, listing: &Listing) -> bool {
 }
 
 /// Why a motion remains unmodified, with its status.
-pub(crate) type Obstacle<'a> = &'a (dyn Fn(u32) -> Option<(Status, OutcomeReason)> + Sync);
+pub(crate) type Obstacle<'a> = &'a (dyn Fn(u32) -> Option<(MotionStatus, OutcomeReason)> + Sync);
 
 /// The motions that could be corrected but remain unmodified with the rest of their cut.
 pub(crate) fn rest_of_cuts(

@@ -28,7 +28,7 @@ use truegrind_calibration::measurement::split;
 use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_compensation::compensate::compensate;
 use truegrind_compensation::cut::Cuts;
-use truegrind_compensation::deviation::{After, Block, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{After, Block, MotionStatus, PathPoint, PathReport};
 use truegrind_compensation::options::Options as RewriteBounds;
 use truegrind_compensation::risk::placement::Placement;
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
@@ -375,7 +375,7 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
             return (case, None);
         }
     };
-    let refused = |p: &&PathPoint| p.status == Status::Refused;
+    let refused = |p: &&PathPoint| p.status == MotionStatus::Refused;
     case.refused = planned.points.iter().filter(refused).count();
     let changed = Program::read(&[(shop.name, bytes.as_slice())], shop.setup);
     let judged = VerificationTask {

@@ -120,7 +120,7 @@ impl Default for RewriteOptions {
 
 /// The outcome of one change.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Outcome {
+pub enum RewriteOutcome {
     /// Equal to the source within the written decimals: no byte changed.
     Unchanged,
     /// The numbers were replaced in place (in the instruction or in the declaration).
@@ -148,5 +148,5 @@ pub struct Rewritten {
     /// One per file, in the order in which the files were given.
     pub files: Vec<FileEdits>,
     /// One per change, in the same order.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<RewriteOutcome>,
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
+use super::document::{Block, Document, KeyFigure, PageVerdict, Provenance, Source};
 use super::plot::{Axis, Graph, Histogram, Ink, Reference, Sample, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -84,7 +84,7 @@ const OTHER_ARM_MM: f64 = 25.0;
 /// Share of a joint's range in the fit below which the verdict says how little was tested.
 const MIN_COVERAGE: f64 = 0.5;
 
-fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
+fn verdict(found: &Acceptance, sensor: Sensor) -> PageVerdict {
     let (status, headline) = headline(found);
     let mut reasons = Vec::new();
     match found.uncertainty {
@@ -143,7 +143,7 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
     if sensor == Sensor::Cable {
         reasons.push("a cable measures errors only along itself; errors across it are not judged".to_owned());
     }
-    Verdict::new(status, headline, reasons)
+    PageVerdict::new(status, headline, reasons)
 }
 
 /// Digits after the point that show a length (mm): three, or two significant ones where it is smaller.

@@ -11,7 +11,7 @@ use super::deviation::{Risk, sections, status_cell, status_word};
 use super::document::{Block, Document};
 use super::placement;
 use super::table::{Cell, Column, Table};
-use truegrind_compensation::deviation::{PathReport, Status as MotionStatus};
+use truegrind_compensation::deviation::{MotionStatus, PathReport};
 use truegrind_compensation::plan::reason::{Figure, OutcomeReason};
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Place};

@@ -155,13 +155,13 @@ impl Inverse<'_> {
         evaluations: u64,
     ) -> Vec<Result<Solution, InverseError>> {
         let count = targets.len().min(seeds.len());
-        let portions = count.div_ceil(CHUNK);
+        let chunks = count.div_ceil(CHUNK);
         targets[..count]
             .par_chunks(CHUNK)
             .zip(seeds[..count].par_chunks(CHUNK))
             .enumerate()
-            .flat_map_iter(|(portion, (targets, seeds))| {
-                let mut budget = SearchBudget::of(evaluations).share(portion, portions);
+            .flat_map_iter(|(chunk, (targets, seeds))| {
+                let mut budget = SearchBudget::of(evaluations).share(chunk, chunks);
                 with_budget(&mut budget, || {
                     let blocks = targets.chunks(WIDTH).zip(seeds.chunks(WIDTH));
                     let solved = blocks.flat_map(|(targets, seeds)| {

@@ -145,7 +145,7 @@ const MIN_GAIN: f64 = 15.0;
 const DETECTABLE: f64 = 15.0;
 
 /// Confirmations of all accepted causes.
-pub(super) struct Outcome {
+pub(super) struct Confirmations {
     /// One for each cause.
     pub confirmations: Vec<Confirmation>,
     /// The discrepancy given the significant causes.
@@ -185,7 +185,7 @@ struct WithColumns {
 
 impl ConfirmationContext<'_> {
     /// Tests all causes.
-    pub(super) fn outcome(&self) -> Outcome {
+    pub(super) fn outcome(&self) -> Confirmations {
         let numbers: Vec<usize> = self.subject.observed.dataset.rows.iter().map(|r| r.number).collect();
         let functions = Functions::of(self.subject, self.linear);
         let own: Vec<WithColumns> = self
@@ -235,7 +235,7 @@ impl ConfirmationContext<'_> {
                 }
             }
         }
-        Outcome { confirmations, discrepancy: eliminated.discrepancy }
+        Confirmations { confirmations, discrepancy: eliminated.discrepancy }
     }
 
     /// Candidates for stability selection: those with enough gain relative to geometry alone. `whole` is the design of the fit beside

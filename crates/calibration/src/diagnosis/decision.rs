@@ -72,7 +72,8 @@ pub fn members(finding: &Finding) -> Vec<Member> {
         share: 0.0,
     }];
     let mut logs = vec![0.0];
-    let least = finding.alternatives.iter().map(|rival| rival.beaten_by).fold(f64::INFINITY, f64::min);
+    let least =
+        finding.alternatives.iter().map(|rival| rival.twice_log_bayes_factor).fold(f64::INFINITY, f64::min);
     let nearer = finding.margin.map_or(0.0, |margin| (least - margin).max(0.0));
     for rival in &finding.alternatives {
         let same = |m: &Member| {
@@ -80,7 +81,7 @@ pub fn members(finding: &Finding) -> Vec<Member> {
                 == (&rival.effect, &rival.joints, rival.rows, rival.family)
         };
         // The same name twice is one member in two variants: the better one counts.
-        let log = -0.5 * (rival.beaten_by - nearer);
+        let log = -0.5 * (rival.twice_log_bayes_factor - nearer);
         if let Some(place) = out.iter().position(same) {
             logs[place] = f64::max(logs[place], log);
             continue;

@@ -16,7 +16,7 @@ pub const SCHEMA: &str = "truegrind.diagnosis/1";
 
 /// The rows that were diagnosed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Source {
+pub struct DiagnosedRows {
     /// File.
     pub file: String,
     /// Rows.
@@ -147,7 +147,8 @@ pub struct Alternative {
     /// Held-out error with it in the finding's place (mm).
     pub cv_rmse_mm: f64,
     /// Twice the log Bayes factor of the finding against it.
-    pub beaten_by: f64,
+    #[serde(rename = "beaten_by")]
+    pub twice_log_bayes_factor: f64,
 }
 
 /// Rows in which the set-up was displaced.
@@ -289,7 +290,7 @@ pub struct Diagnosis {
     /// [`SCHEMA`].
     pub schema: String,
     /// The rows.
-    pub dataset: Source,
+    pub dataset: DiagnosedRows,
     /// The verdict on the extended model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,

@@ -60,7 +60,7 @@ pub(super) struct Handover<'a> {
 }
 
 /// The arm for compensation.
-pub(super) struct HandedOver {
+pub(super) struct WrittenModel {
     pub(super) estimated: Estimated,
     /// Absent where it cannot be stated.
     pub(super) benefit: Option<Benefit>,
@@ -87,7 +87,7 @@ struct WrittenArm<'a> {
 
 impl Handover<'_> {
     /// The arm with the causes that are `certain`, or with fewer of them, as the notes say.
-    pub(super) fn arm(&self, certain: &[bool], notes: &mut Vec<String>) -> HandedOver {
+    pub(super) fn arm(&self, certain: &[bool], notes: &mut Vec<String>) -> WrittenModel {
         let (search, discrepancy) = (self.search, self.discrepancy);
         let certain = certain_model(search, certain, discrepancy);
         let beside_sensor = certain.errors;
@@ -118,10 +118,10 @@ impl Handover<'_> {
     /// a common growth is met by a link of another length whose constant part the frames take up.
     fn or_geometry_alone(
         &self,
-        with_causes: HandedOver,
+        with_causes: WrittenModel,
         beside_sensor: StageError,
         notes: &mut Vec<String>,
-    ) -> HandedOver {
+    ) -> WrittenModel {
         let verdict = &with_causes.estimated.verdict;
         if verdict.status != Judgement::Fail || self.search.full_fit.causes.is_empty() {
             return with_causes;
@@ -171,7 +171,7 @@ impl Handover<'_> {
 
     /// The arm for compensation and its expected benefit. What it lacks stands in its covariance. Of too few poses no benefit is stated:
     /// it would be the priors'.
-    fn estimated(&self, arm: &WrittenArm<'_>) -> HandedOver {
+    fn estimated(&self, arm: &WrittenArm<'_>) -> WrittenModel {
         let SearchContext { subject, options, .. } = self.search.context;
         let (nominal, rows) = (subject.nominal, &subject.observed.dataset);
         let [fitted, handed] = &[arm.fitted, arm.with_uncertain].map(|fit| self.widened(fit));
@@ -205,7 +205,7 @@ impl Handover<'_> {
             set_aside: (self.search.set_aside.len(), rows.rows.len()),
             options,
         });
-        HandedOver { estimated, benefit: benefit.ok() }
+        WrittenModel { estimated, benefit: benefit.ok() }
     }
 
     /// The rows that were not set aside.

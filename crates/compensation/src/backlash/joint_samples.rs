@@ -191,16 +191,16 @@ impl Samples {
             ((end - last).amax() < MAX_STEP_RAD).then_some(out)
         };
         let motions = self.ends.len();
-        let portions = search_budget::shared_out(
+        let chunks = search_budget::shared_out(
             SearchBudget::of(search_budget::SIDES),
             motions.div_ceil(search_budget::CHUNK),
-            |portion, budget| {
-                let first = portion * search_budget::CHUNK;
+            |chunk, budget| {
+                let first = chunk * search_budget::CHUNK;
                 let here = first..(first + search_budget::CHUNK).min(motions);
                 with_budget(budget, || here.map(of).collect::<Vec<_>>())
             },
         );
-        portions.into_iter().flatten().collect()
+        chunks.into_iter().flatten().collect()
     }
 }
 

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use crate::cut::{CutsOf, Obstacle, StartsOf, follows_position, may_cut};
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget::MANY_MOTIONS;
 use truegrind_programs::motion::{Listing, Motion, MotionKind};
@@ -111,7 +111,7 @@ impl<'a> Starts<'a> {
                         None => found.get(&start).copied().or_else(of_cut),
                         Some((status, reason)) => {
                             let is_risk = matches!(reason, OutcomeReason::Risk { .. });
-                            Some(reason).filter(|_| status == Status::Refused || is_risk)
+                            Some(reason).filter(|_| status == MotionStatus::Refused || is_risk)
                         }
                     };
                     let Some(reason) = refused.filter(|_| self.would_tilt(start, index)) else { return };

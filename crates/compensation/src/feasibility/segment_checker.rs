@@ -94,11 +94,10 @@ impl SegmentChecker<'_, '_> {
             let found = search_budget::shared_out(
                 whole,
                 suspects.len().div_ceil(search_budget::CHUNK),
-                |portion, budget| {
+                |chunk, budget| {
                     let segment_fault =
                         |motion: &usize| Some((*motion, here.segment_fault(*motion, samples, budget)?));
-                    let mine =
-                        suspects.iter().skip(portion * search_budget::CHUNK).take(search_budget::CHUNK);
+                    let mine = suspects.iter().skip(chunk * search_budget::CHUNK).take(search_budget::CHUNK);
                     mine.filter_map(segment_fault).collect::<Vec<_>>()
                 },
             );

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::arms::Arms;
 use crate::cut::{self, Cuts, CutsOf};
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::feasibility::approaches::{Shift, Starts};
 use crate::feasibility::arc_feasibility::infeasible_arcs;
 use crate::feasibility::half_turns::half_turns;
@@ -98,7 +98,7 @@ pub(crate) fn blocking_reason(
     solved: &SolvedTargets<'_>,
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
-) -> Option<(Status, OutcomeReason)> {
+) -> Option<(MotionStatus, OutcomeReason)> {
     let motion = &listing.motions[index as usize];
     if let Some(reason) = motion.own_reason.map(OutcomeReason::Program) {
         return Some((unchanged(reason), reason));
@@ -110,21 +110,24 @@ pub(crate) fn blocking_reason(
         return Some((unchanged(reason), reason));
     }
     if targets.is_empty() {
-        return Some((Status::Left, OutcomeReason::Program(Reason::ExternalOnly)));
+        return Some((MotionStatus::Left, OutcomeReason::Program(Reason::ExternalOnly)));
     }
     if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
-        return Some((Status::Left, OutcomeReason::JointTarget));
+        return Some((MotionStatus::Left, OutcomeReason::JointTarget));
     }
     let forbidden = targets.iter().find_map(|target| target.as_ref().ok()?.forbidden.as_deref().copied());
     let reason = forbidden.or_else(|| unchanged_motions.get(&index).copied())?;
-    Some((if matches!(reason, OutcomeReason::Risk { .. }) { Status::Left } else { Status::Refused }, reason))
+    Some((
+        if matches!(reason, OutcomeReason::Risk { .. }) { MotionStatus::Left } else { MotionStatus::Refused },
+        reason,
+    ))
 }
 
 /// Status of an unmodified motion: left where the text states too little, refused where what it states is impossible.
-fn unchanged(reason: OutcomeReason) -> Status {
+fn unchanged(reason: OutcomeReason) -> MotionStatus {
     match reason {
-        OutcomeReason::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,
-        OutcomeReason::Program(_) => Status::Left,
-        _ => Status::Refused,
+        OutcomeReason::Program(Reason::BeyondReach | Reason::NumberRange) => MotionStatus::Refused,
+        OutcomeReason::Program(_) => MotionStatus::Left,
+        _ => MotionStatus::Refused,
     }
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use crate::arms::Arms;
 use crate::cell::Cell;
 use crate::cut::{self, Cuts, CutsOf, StartsOf};
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::feasibility::joint_lines::lines_off_as_joints;
 use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
 use crate::frames::frame_table::FrameTable;
@@ -191,7 +191,7 @@ impl<'a> SolvedProgram<'a> {
                 .filter(|motion| !solved.of(*motion as usize).is_empty())
                 .filter(|motion| solved.of(*motion as usize).iter().all(Result::is_ok))
                 .filter_map(|motion| match blocking_reason(motion, listing, solved, options, &unchanged) {
-                    Some((Status::Refused, why)) => Some((motion, why)),
+                    Some((MotionStatus::Refused, why)) => Some((motion, why)),
                     _ => None,
                 })
                 .collect();

@@ -9,7 +9,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::options::{Circles, Options};
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -190,7 +190,7 @@ fn a_zone_that_inserted_targets_cut_short_is_flagged() {
         matches!(outcome.reason(), Some(OutcomeReason::CornerDeviation { mm }) if mm > 1.0),
         "{outcome:?}"
     );
-    assert_eq!(outcome.status, Status::Flagged);
+    assert_eq!(outcome.status, MotionStatus::Flagged);
 }
 
 // ---- speed ----
@@ -425,9 +425,9 @@ fn a_line_of_which_the_start_is_not_known_is_flagged() {
         matches!(why, Some(OutcomeReason::PathDeviation { mm }) if (mm - stated).abs() < 1e-9),
         "{why:?}"
     );
-    assert_eq!((tight.outcomes[1].status, tight.outcomes[1].inserted), (Status::Flagged, 0));
+    assert_eq!((tight.outcomes[1].status, tight.outcomes[1].inserted), (MotionStatus::Flagged, 0));
     let (planned, _) = rewrite(&module_with("", &lines), &known, &loose);
-    let statuses: Vec<Status> = planned.outcomes.iter().map(|outcome| outcome.status).collect();
-    assert_eq!(statuses, [Status::Changed, Status::Flagged]);
+    let statuses: Vec<MotionStatus> = planned.outcomes.iter().map(|outcome| outcome.status).collect();
+    assert_eq!(statuses, [MotionStatus::Changed, MotionStatus::Flagged]);
     assert_eq!(planned.outcomes[1].reason(), Some(OutcomeReason::UncheckedPath));
 }

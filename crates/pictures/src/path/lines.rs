@@ -9,7 +9,7 @@ use crate::colour::{BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, TOOL, TRAVEL, WORK
 use crate::legend;
 use crate::page::bounds;
 use crate::recording::{Store, VisualError};
-use truegrind_compensation::deviation::{Deviation, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{Deviation, MotionStatus, PathPoint, PathReport};
 
 /// Tool axes that are drawn at most.
 const AXES: usize = 40;
@@ -229,7 +229,7 @@ fn tool_axes(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
 
 fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
     for (status, name, colour) in
-        [(Status::Flagged, "flagged", FLAGGED), (Status::Refused, "refused", REFUSED)]
+        [(MotionStatus::Flagged, "flagged", FLAGGED), (MotionStatus::Refused, "refused", REFUSED)]
     {
         let marked: Vec<&PathPoint> = plan.first.points.iter().filter(|p| p.status == status).collect();
         if marked.is_empty() {

@@ -71,7 +71,7 @@ impl Part {
         let inverse = Cholesky::new(information.clone())?.inverse();
         let count = self.readings.ncols() / per;
         const CHUNK: usize = 128;
-        let portions: Vec<Vec<f64>> = (0..count)
+        let chunks: Vec<Vec<f64>> = (0..count)
             .into_par_iter()
             .step_by(CHUNK)
             .map(|first| {
@@ -88,7 +88,7 @@ impl Part {
                     .collect()
             })
             .collect();
-        Some(portions.concat())
+        Some(chunks.concat())
     }
 }
 
