@@ -189,11 +189,11 @@ fn inverse_lanes_near_nominal_joints(bencher: Bencher<'_, '_>, name: &str) {
     let targets = targets(&model);
     let seeds: Vec<Joints> = path().iter().map(|seed| seed.map(|q| q + 3e-3)).collect();
     let inverse = Inverse::new(&model, &Condition::default(), &nominal);
-    let portion = 1024; // what one thread takes
+    let chunk = 1024; // what one thread takes
     assert!(inverse.solve_seeded(&targets, &seeds).iter().all(Result::is_ok));
     bencher
-        .counter(ItemsCount::new(portion))
-        .bench_local(|| black_box(inverse.solve_seeded(black_box(&targets[..portion]), &seeds[..portion])));
+        .counter(ItemsCount::new(chunk))
+        .bench_local(|| black_box(inverse.solve_seeded(black_box(&targets[..chunk]), &seeds[..chunk])));
 }
 
 #[divan::bench(args = ["links", "effects"])]

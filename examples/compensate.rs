@@ -5,8 +5,8 @@
 use std::error::Error;
 
 use truegrind::{
-    Cell, CompensateOptions, Effect, Harmonic, IdentifyOptions, ImportOptions, Mark, NcSetup, Program,
-    Status, Tolerance, compensate, identify, read_measurements, robots, split, starting_frames,
+    Cell, CompensateOptions, Effect, Harmonic, IdentifyOptions, ImportOptions, Mark, MotionStatus, NcSetup,
+    Program, Tolerance, compensate, identify, read_measurements, robots, split, starting_frames,
 };
 
 const MODULE: &str = "\
@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             (None, None) => println!(),
         }
     }
-    if done.plan.outcomes.iter().any(|outcome| outcome.status == Status::Changed) {
+    if done.plan.outcomes.iter().any(|outcome| outcome.status == MotionStatus::Changed) {
         let corrected = done.rewritten.files[0].edits.apply(MODULE.as_bytes())?;
         println!("{}", String::from_utf8_lossy(&corrected));
     }

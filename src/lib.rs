@@ -122,7 +122,9 @@ pub use truegrind_programs::nc::setup::Setup as NcSetup;
 pub use truegrind_programs::nc::writer::write as write_nc;
 pub use truegrind_programs::rapid::writer::write as write_rapid;
 pub use truegrind_programs::reading::{Language, Program};
-pub use truegrind_programs::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
+pub use truegrind_programs::rewrite::{
+    Change, FileEdits, NewTarget, RewriteOptions, RewriteOutcome, Rewritten,
+};
 
 // Surfaces, tool paths and measurement plans.
 pub use truegrind_planning::poses::{
@@ -136,7 +138,7 @@ pub use truegrind_surfaces::{Contact, Domain, Mesh, Surface, SurfaceFile};
 pub use truegrind_compensation::cell::{Cell, CellError, CellFrame, FrameOrigin, Teaches};
 pub use truegrind_compensation::compensate::{CompensateError, Compensated, compensate};
 pub use truegrind_compensation::cut::Cuts;
-pub use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
+pub use truegrind_compensation::deviation::{After, Deviation, MotionStatus, PathPoint, PathReport};
 pub use truegrind_compensation::options::{Circles, Emit, Options as CompensateOptions};
 pub use truegrind_compensation::plan::reason::OutcomeReason;
 pub use truegrind_compensation::plan::{MotionOutcome, Plan as CompensatePlan};

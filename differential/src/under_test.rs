@@ -7,7 +7,7 @@ use truegrind::arm::estimated::Estimated;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::{CompensateError, Compensated, compensate};
 use truegrind::compensation::cut::Cuts;
-use truegrind::compensation::deviation::Status as Became;
+use truegrind::compensation::deviation::MotionStatus as Became;
 use truegrind::compensation::options::{self, Circles, Emit};
 use truegrind::compensation::plan::reason::OutcomeReason;
 use truegrind::programs::motion::{Listing, Mark, Motion};

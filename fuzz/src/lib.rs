@@ -11,7 +11,7 @@ use truegrind::arm::model::Joints;
 use truegrind::calibration::measurement::simulation::recipe::Recipe;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::{CompensateError, compensate};
-use truegrind::compensation::deviation::Status;
+use truegrind::compensation::deviation::MotionStatus;
 use truegrind::compensation::frames::taught::{taught_frame, taught_tcp};
 use truegrind::compensation::options::Options as Bounds;
 use truegrind::papers::experiment::Experiment;
@@ -142,7 +142,7 @@ fn job(program: &Program<'_>, sources: &[&[u8]], cell: &Cell, arm: &Estimated) {
                 assert!(position_mm.iter().chain(quaternion).all(|x| x.is_finite()));
             }
         }
-        let written = matches!(outcome.status, Status::Changed | Status::Flagged);
+        let written = matches!(outcome.status, MotionStatus::Changed | MotionStatus::Flagged);
         assert!(
             !written
                 || [outcome.after_mm, outcome.sigma_mm]

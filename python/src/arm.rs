@@ -46,7 +46,7 @@ pub(crate) struct Stated {
 }
 
 /// Payloads above this are typing errors (kg).
-const LARGEST_PAYLOAD_KG: f64 = 3000.0;
+const MAX_PAYLOAD_KG: f64 = 3000.0;
 
 impl Stated {
     /// The condition of a call. The centre of mass is stated in the flange frame and stored in the last link frame.
@@ -55,7 +55,7 @@ impl Stated {
     /// A mass out of range.
     pub(crate) fn on(&self, arm: &Model, own: &Condition) -> Result<Condition, Refusal> {
         if let Some(kg) = self.payload_kg
-            && !(0.0..=LARGEST_PAYLOAD_KG).contains(&kg)
+            && !(0.0..=MAX_PAYLOAD_KG).contains(&kg)
         {
             return Err(Refusal::argument("payload_kg", kg, "a mass in kg, from 0 to 3000"));
         }

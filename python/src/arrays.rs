@@ -20,7 +20,7 @@ pub(crate) type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
 const BLOCK: usize = 512;
 
 /// Number of rows from which several threads are used.
-const MANY: usize = 16 * BLOCK;
+const MANY_ROWS: usize = 16 * BLOCK;
 
 /// The doubles of an argument, copied only if NumPy has to convert them.
 ///
@@ -147,7 +147,7 @@ fn all_rows(
         }
     };
     let count = position.len() / 3;
-    if count < MANY {
+    if count < MANY_ROWS {
         let mut buffers = Default::default();
         let blocks = position.chunks_mut(3 * BLOCK).zip(rotation.chunks_mut(9 * BLOCK)).enumerate();
         blocks.for_each(|(k, (p, r))| block(&mut buffers, k * BLOCK, p, r));

@@ -78,8 +78,8 @@ const KEYWORDS: [(&str, &str); 10] = [
 
 /// An argument may be a whole file.
 fn clipped(mut text: String) -> String {
-    const MOST: usize = 200;
-    if let Some((end, _)) = text.char_indices().nth(MOST) {
+    const MAX_CHARACTERS: usize = 200;
+    if let Some((end, _)) = text.char_indices().nth(MAX_CHARACTERS) {
         text.truncate(end);
         text.push('…');
     }

@@ -14,7 +14,7 @@ use crate::errors::{Kind, Refusal};
 const LOOK: Duration = Duration::from_millis(20);
 
 /// More threads would only cost memory.
-const MOST_THREADS: i64 = 1024;
+const MAX_THREADS: i64 = 1024;
 
 enum Event {
     Step(String),
@@ -30,7 +30,7 @@ pub(crate) fn run<T: Send>(
     work: impl FnOnce() -> Result<T, Refusal> + Send,
 ) -> PyResult<T> {
     let within = |n: i64| match usize::try_from(n) {
-        Ok(count) if (1..=MOST_THREADS).contains(&n) => Ok(count),
+        Ok(count) if (1..=MAX_THREADS).contains(&n) => Ok(count),
         _ => Err(Refusal::argument("threads", n, "1 to 1024")),
     };
     let threads = threads.map(within).transpose()?;

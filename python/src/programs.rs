@@ -19,7 +19,7 @@ use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::report::{deviation as deviations, format};
 use truegrind::{
     ActingArm, After, Cell, Circles, CompensateOptions, CompensatePlan, Compensated, Condition, Cuts, Emit,
-    Estimated, Listing, Mark, NcSetup, PathReport, Program, Status, SurfaceFile, VerificationTask,
+    Estimated, Listing, Mark, NcSetup, PathReport, Program, MotionStatus, SurfaceFile, VerificationTask,
     compensate, robots, verify,
 };
 
@@ -281,10 +281,10 @@ impl PyCompensation {
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Typed<Counts, Bound<'py, PyDict>>> {
         let out = PyDict::new(py);
         for (word, status) in [
-            ("changed", Status::Changed),
-            ("flagged", Status::Flagged),
-            ("refused", Status::Refused),
-            ("left", Status::Left),
+            ("changed", MotionStatus::Changed),
+            ("flagged", MotionStatus::Flagged),
+            ("refused", MotionStatus::Refused),
+            ("left", MotionStatus::Left),
         ] {
             out.set_item(word, self.plan.outcomes.iter().filter(|outcome| outcome.status == status).count())?;
         }

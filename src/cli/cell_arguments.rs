@@ -22,7 +22,7 @@ use super::files;
 use super::terminal::print_message;
 
 /// Payloads above this are typing errors (kg).
-const LARGEST_PAYLOAD_KG: f64 = 3000.0;
+const MAX_PAYLOAD_KG: f64 = 3000.0;
 
 /// Cell, surface and payload.
 #[derive(Debug, Clone, Args)]
@@ -57,9 +57,9 @@ impl CellArguments {
         model: Option<&Estimated>,
     ) -> anyhow::Result<(Cell, Option<SurfaceFile>, Condition)> {
         if let Some(kg) = self.payload
-            && !(0.0..=LARGEST_PAYLOAD_KG).contains(&kg)
+            && !(0.0..=MAX_PAYLOAD_KG).contains(&kg)
         {
-            bail!("--payload {kg}: expected a mass in kg, from 0 to {LARGEST_PAYLOAD_KG}");
+            bail!("--payload {kg}: expected a mass in kg, from 0 to {MAX_PAYLOAD_KG}");
         }
         self.refuse_other_load(model)?;
         self.note_overload(model);

@@ -19,12 +19,12 @@ pub(super) struct Common {
 }
 
 /// More threads would only cost memory.
-const MOST_THREADS: usize = 1024;
+const MAX_THREADS: usize = 1024;
 
 fn check_threads(threads: Option<usize>) -> anyhow::Result<Option<usize>> {
     match threads {
-        Some(n) if !(1..=MOST_THREADS).contains(&n) => {
-            anyhow::bail!("--threads {n}: expected 1 to {MOST_THREADS}")
+        Some(n) if !(1..=MAX_THREADS).contains(&n) => {
+            anyhow::bail!("--threads {n}: expected 1 to {MAX_THREADS}")
         }
         threads => Ok(threads),
     }
@@ -46,7 +46,7 @@ pub(super) fn on_threads_that_wait<T: Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> T + Send,
 ) -> anyhow::Result<T> {
-    on_threads(threads.or_else(|| Some((rayon::current_num_threads() + 1).min(MOST_THREADS))), work)
+    on_threads(threads.or_else(|| Some((rayon::current_num_threads() + 1).min(MAX_THREADS))), work)
 }
 
 /// Runs `work` on the given number of threads.

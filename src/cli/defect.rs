@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 /// thread.
 static LOCATIONS: Mutex<VecDeque<(String, String)>> = Mutex::new(VecDeque::new());
 
-const MOST_LOCATIONS: usize = 64;
+const MAX_LOCATIONS: usize = 64;
 
 /// Replaces the panic hook by one that prints nothing; the message is printed where the panic is caught.
 pub(super) fn install_silent_hook() {
@@ -22,7 +22,7 @@ pub(super) fn install_silent_hook() {
         if locations.iter().all(|(known, _)| *known != message) {
             locations.push_back((message, location));
         }
-        if locations.len() > MOST_LOCATIONS {
+        if locations.len() > MAX_LOCATIONS {
             locations.pop_front();
         }
     }));

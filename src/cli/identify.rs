@@ -94,8 +94,8 @@ impl PointsArguments {
     /// Settings for matching by time, if requested.
     fn clocks(&self) -> anyhow::Result<Option<TimeMatching>> {
         let Some(within_s) = self.points_within else { return Ok(None) };
-        if !(0.0..=LONGEST_S).contains(&within_s) || within_s == 0.0 {
-            bail!("--points-within {within_s}: expected a time above 0 s, up to {LONGEST_S} s");
+        if !(0.0..=MAX_POINTS_WITHIN_S).contains(&within_s) || within_s == 0.0 {
+            bail!("--points-within {within_s}: expected a time above 0 s, up to {MAX_POINTS_WITHIN_S} s");
         }
         let ahead_s = self.points_ahead.unwrap_or(0.0);
         if !ahead_s.is_finite() {
@@ -106,10 +106,10 @@ impl PointsArguments {
 }
 
 /// Largest `--sensor-scale-sigma` (%): a sensor that is off by more measures nothing.
-const LARGEST_SCALE_PERCENT: f64 = 10.0;
+const MAX_SCALE_PERCENT: f64 = 10.0;
 
 /// Largest `--points-within` (s).
-const LONGEST_S: f64 = 3600.0;
+const MAX_POINTS_WITHIN_S: f64 = 3600.0;
 
 impl DataArguments {
     /// A plain measurement file of a robot.
@@ -186,10 +186,8 @@ impl FitArguments {
             }
         }
         if let Some(percent) = self.sensor_scale_sigma {
-            if !(0.0..=LARGEST_SCALE_PERCENT).contains(&percent) {
-                bail!(
-                    "--sensor-scale-sigma {percent}: expected a percentage from 0 to {LARGEST_SCALE_PERCENT}"
-                );
+            if !(0.0..=MAX_SCALE_PERCENT).contains(&percent) {
+                bail!("--sensor-scale-sigma {percent}: expected a percentage from 0 to {MAX_SCALE_PERCENT}");
             }
             tolerance.scale = Some(percent / 100.0);
         }

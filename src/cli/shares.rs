@@ -7,7 +7,7 @@
 //!
 //! A unit may crash its whole process (memory, stack). The next job over the same units sees that an earlier one did not finish,
 //! and from then on marks each unit that it begins. A unit that was begun but not finished is processed last and alone, and after
-//! [`MOST_BEGUN`] attempts it is listed as failed. Jobs that do not crash write no marks.
+//! [`MAX_ATTEMPTS`] attempts it is listed as failed. Jobs that do not crash write no marks.
 
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ use super::programs::Job;
 use super::terminal::print_message;
 
 /// Attempts before a unit that crashes its process is listed as failed.
-const MOST_BEGUN: u32 = 3;
+const MAX_ATTEMPTS: u32 = 3;
 
 /// Folder of the tables of the shares, and prefix of their names.
 const TABLES: &str = "tables";
@@ -382,7 +382,7 @@ impl<'s> JobSession<'s> {
                 return Ok(None);
             }
         }
-        if times >= MOST_BEGUN {
+        if times >= MAX_ATTEMPTS {
             let reason = format!(
                 "processing it crashed {times} times, the last times with nothing else running: too little memory, or a defect of \
                  truegrind, which please report (--resume skips it; without --resume it is tried again)"

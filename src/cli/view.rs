@@ -13,7 +13,7 @@ use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::solver::SOLVERS;
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::compensation::cell::Used;
-use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use truegrind::compensation::deviation::{After, Deviation, MotionStatus, PathPoint, PathReport};
 use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind::math::se3::Pose;
 use truegrind::pictures::measured::Residuals;
@@ -255,7 +255,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
                 sigma_mm: Some(arm.position_sigma_mm(&estimated, &joints, &Pose::identity(), None)),
                 shape_sigma_mm: None,
                 outside: None,
-                status: Status::Left,
+                status: MotionStatus::Left,
                 reason: None,
             }
         })

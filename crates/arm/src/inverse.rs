@@ -27,7 +27,7 @@ use nalgebra::Matrix6;
 
 use self::configuration::{BRANCH_TOLERANCE, Configuration};
 use self::kernel::{Kernel, Solved};
-use self::newton::{Goal, Outcome};
+use self::newton::{Goal, NewtonResult};
 use self::structure::Structure;
 use super::chain::FrameColumns;
 use super::condition::Condition;
@@ -296,7 +296,7 @@ impl<'a> Inverse<'a> {
         })
     }
 
-    fn solution(&self, outcome: &Outcome) -> Solution {
+    fn solution(&self, outcome: &NewtonResult) -> Solution {
         Solution {
             joints: outcome.joints,
             residual_mm: outcome.residual_mm,

@@ -56,15 +56,15 @@ fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {
 }
 
 /// Poses that one thread processes at a time.
-const PORTION: usize = 8192;
+const CHUNK: usize = 8192;
 
 /// Updates each pose's distance to the nearest sample with one more; returns the farthest pose, the last of several.
 fn farthest(nearest: &mut [f64], poses: &[[f64; 6]], sample: &[f64; 6]) -> Option<(usize, f64)> {
     let last = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0));
-    let portions = nearest.par_chunks_mut(PORTION).zip(poses.par_chunks(PORTION)).enumerate();
-    let farthest = portions.filter_map(|(portion, (nearest, poses))| {
+    let chunks = nearest.par_chunks_mut(CHUNK).zip(poses.par_chunks(CHUNK)).enumerate();
+    let farthest = chunks.filter_map(|(chunk, (nearest, poses))| {
         nearest.iter_mut().zip(poses).for_each(|(d, pose)| *d = d.min(distance(pose, sample)));
-        let indexed = nearest.iter().enumerate().map(|(k, d)| (portion * PORTION + k, *d));
+        let indexed = nearest.iter().enumerate().map(|(k, d)| (chunk * CHUNK + k, *d));
         indexed.max_by(last)
     });
     farthest.max_by(last)

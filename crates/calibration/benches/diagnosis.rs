@@ -132,7 +132,7 @@ fn main() {
                         let rivals: Vec<String> = f
                             .alternatives
                             .iter()
-                            .map(|a| format!("{} {:?} {:.1}", a.effect, a.joints, a.beaten_by))
+                            .map(|a| format!("{} {:?} {:.1}", a.effect, a.joints, a.twice_log_bayes_factor))
                             .collect();
                         println!(
                             "   {} {:?}: λ {:.0?}, ahead of {rivals:?}; {:?}",

@@ -36,10 +36,10 @@ use crate::measurement::noise_floor::{noise_floor, noise_floor_rad};
 use crate::measurement::repeated_poses::poses;
 use crate::measurement::split::{Split, folds};
 
-pub use self::decision::{Decision, FEWEST_POSES, Uncertainty};
+pub use self::decision::{Decision, MIN_POSES, Uncertainty};
 pub use self::error::AcceptError;
 pub use self::stations::Uncounted;
-pub use self::tested::{LEAST_SHARE, Tested};
+pub use self::tested::{MIN_SHARE, Tested};
 
 /// Poses and cycles at each for pose accuracy and repeatability (ISO 9283).
 pub const ISO_POSES: usize = 5;

@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::cell::Cell;
 use crate::condition::overload::{is_far_above_rating, stated_overload};
 use crate::cut::{Cuts, may_cut};
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::frames::taught::contradictions;
 use crate::frames::undeclared;
 use crate::options::{Emit, Options};
@@ -26,7 +26,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_programs::edit::EditError;
 use truegrind_programs::motion::{Listing, Mark, MotionKind, Reason};
 use truegrind_programs::reading::{Language, Program};
-use truegrind_programs::rewrite::{Outcome, RewriteOptions, Rewritten};
+use truegrind_programs::rewrite::{RewriteOptions, RewriteOutcome, Rewritten};
 
 /// A corrected program.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,7 +121,7 @@ pub fn compensate_prepared(
             refused.entry(motion).or_insert(reason);
         }
         round += 1;
-        if round >= MOST_ROUNDS {
+        if round >= MAX_ROUNDS {
             // Every round removed more motions, so the whole program remains unmodified.
             for change in &planned.changes {
                 refused.entry(change.motion).or_insert(OutcomeReason::NoConsistentPlan);
@@ -168,7 +168,7 @@ fn air_moves_alone(listing: &Listing, planned: &Plan) -> Vec<(u32, OutcomeReason
 }
 
 /// Rounds of planning and writing before every remaining change is refused.
-const MOST_ROUNDS: usize = 16;
+const MAX_ROUNDS: usize = 16;
 
 /// The plan, reconciled with what was written.
 fn agreed(
@@ -204,12 +204,12 @@ fn refusals(planned: &Plan, rewritten: &Rewritten, listing: &Listing) -> BTreeMa
     let outcomes = planned.changes.iter().zip(&rewritten.outcomes);
     let refused = outcomes.filter_map(|(change, outcome)| match outcome {
         // Rounded to the written decimals, the points make no circle.
-        Outcome::Refused(Reason::WrongShape)
+        RewriteOutcome::Refused(Reason::WrongShape)
             if listing.motions[change.motion as usize].kind == MotionKind::Circular =>
         {
             Some((change.motion, OutcomeReason::NoCircle))
         }
-        Outcome::Refused(reason) => Some((change.motion, OutcomeReason::Program(*reason))),
+        RewriteOutcome::Refused(reason) => Some((change.motion, OutcomeReason::Program(*reason))),
         _ => None,
     });
     refused.collect()
@@ -221,13 +221,13 @@ fn reconcile(planned: &mut Plan, rewritten: &Rewritten, refused: &BTreeMap<u32, 
         let row = &mut planned.outcomes[change.motion as usize];
         let open = [OutcomeReason::UnknownStart, OutcomeReason::UncheckedPath];
         let is_sound =
-            row.status == Status::Changed || row.reason().is_some_and(|reason| open.contains(&reason));
-        if *outcome == Outcome::Unchanged && is_sound {
-            row.status = Status::Left;
+            row.status == MotionStatus::Changed || row.reason().is_some_and(|reason| open.contains(&reason));
+        if *outcome == RewriteOutcome::Unchanged && is_sound {
+            row.status = MotionStatus::Left;
             row.reason = Some(Box::new(OutcomeReason::NoChange));
         }
         if let Some(reason) = refused.get(&change.motion) {
-            row.status = Status::Refused;
+            row.status = MotionStatus::Refused;
             row.reason = Some(Box::new(*reason));
             row.after_mm = row.before_mm;
         }

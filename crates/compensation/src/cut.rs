@@ -12,9 +12,9 @@
 
 use rayon::prelude::*;
 
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::plan::reason::OutcomeReason;
-use crate::search_budget::MANY;
+use crate::search_budget::MANY_MOTIONS;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
 
 /// Treatment of a cut in which some motion cannot be corrected.
@@ -56,7 +56,7 @@ impl CutsOf {
 /// The cuts of a listing. `part_of`: for each work object the first of those that are placed as one with it.
 pub(crate) fn of(listing: &Listing, treatment: Cuts, part_of: &[u32]) -> CutsOf {
     let motions = &listing.motions;
-    let may_cut: Vec<bool> = motions.par_iter().with_min_len(MANY).map(may_cut).collect();
+    let may_cut: Vec<bool> = motions.par_iter().with_min_len(MANY_MOTIONS).map(may_cut).collect();
     let is_one_path = |start: u32, index: u32| {
         let [before, motion] = [start, index].map(|index| &motions[index as usize]);
         may_cut[start as usize]
@@ -66,7 +66,7 @@ pub(crate) fn of(listing: &Listing, treatment: Cuts, part_of: &[u32]) -> CutsOf 
     // The motion that each one goes on from, if they belong to one path.
     let starts: Vec<Option<u32>> = motions
         .par_iter()
-        .with_min_len(MANY)
+        .with_min_len(MANY_MOTIONS)
         .enumerate()
         .map(|(index, motion)| {
             let stands_before = || {
@@ -203,7 +203,7 @@ fn stops(motion: &Motion, listing: &Listing) -> bool {
 }
 
 /// Why a motion remains unmodified, with its status.
-pub(crate) type Obstacle<'a> = &'a (dyn Fn(u32) -> Option<(Status, OutcomeReason)> + Sync);
+pub(crate) type Obstacle<'a> = &'a (dyn Fn(u32) -> Option<(MotionStatus, OutcomeReason)> + Sync);
 
 /// The motions that could be corrected but remain unmodified with the rest of their cut.
 pub(crate) fn rest_of_cuts(
@@ -211,7 +211,7 @@ pub(crate) fn rest_of_cuts(
     cuts: &CutsOf,
     blocking_reason: Obstacle<'_>,
 ) -> Vec<(u32, OutcomeReason)> {
-    let motions = (0..cuts.of.len() as u32).into_par_iter().with_min_len(MANY);
+    let motions = (0..cuts.of.len() as u32).into_par_iter().with_min_len(MANY_MOTIONS);
     let blocked: Vec<(u32, u32, OutcomeReason)> =
         motions.filter_map(|index| Some((index, cuts.root(index)?, blocking_reason(index)?.1))).collect();
     if blocked.is_empty() {

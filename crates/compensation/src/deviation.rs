@@ -58,7 +58,7 @@ impl Deviation {
 /// Outcome of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Status {
+pub enum MotionStatus {
     /// Rewritten.
     Changed,
     /// Unmodified: nothing to change, or not known before run time.
@@ -69,10 +69,10 @@ pub enum Status {
     Flagged,
 }
 
-impl Status {
+impl MotionStatus {
     /// Whether the motion is rewritten.
     pub fn is_written(self) -> bool {
-        matches!(self, Status::Changed | Status::Flagged)
+        matches!(self, MotionStatus::Changed | MotionStatus::Flagged)
     }
 }
 
@@ -122,7 +122,7 @@ pub struct PathPoint {
     /// How the point leaves the region in which the arm was measured.
     pub outside: Option<Outside>,
     /// Outcome of the point.
-    pub status: Status,
+    pub status: MotionStatus,
     /// Reason, where it was not simply rewritten.
     pub reason: Option<String>,
 }
@@ -133,8 +133,8 @@ impl PathPoint {
     pub fn expected_mm(&self) -> Option<f64> {
         let after = self.after?.norm_mm();
         match self.status {
-            Status::Left | Status::Refused => Some(after),
-            Status::Changed | Status::Flagged => Some(after.hypot(self.sigma_mm?)),
+            MotionStatus::Left | MotionStatus::Refused => Some(after),
+            MotionStatus::Changed | MotionStatus::Flagged => Some(after.hypot(self.sigma_mm?)),
         }
     }
 
@@ -240,7 +240,7 @@ pub struct MissingMotion {
     /// Instruction.
     pub instruction: String,
     /// Outcome.
-    pub status: Status,
+    pub status: MotionStatus,
     /// Reason for it, where one is known.
     pub reason: Option<String>,
 }
@@ -257,7 +257,10 @@ pub struct MissingMotions {
 impl MissingMotions {
     /// Motions of a listing; `None` without any. Waits, calls and motions of external axes alone have no point either. `outcome`: why a
     /// motion has no point; `None` for one that has.
-    pub fn of(listing: &Listing, outcome: impl Fn(u32) -> Option<(Status, Option<String>)>) -> Option<Self> {
+    pub fn of(
+        listing: &Listing,
+        outcome: impl Fn(u32) -> Option<(MotionStatus, Option<String>)>,
+    ) -> Option<Self> {
         let (mut without, mut motions, mut points_before) = (Vec::new(), Vec::new(), 0);
         for (index, motion) in (0_u32..).zip(&listing.motions) {
             let Some((status, reason)) = outcome(index) else {

@@ -10,7 +10,7 @@ pub mod solved_program;
 pub mod steps_to_left;
 mod surface_normals;
 
-use crate::deviation::{MissingMotions, PathPoint, Status};
+use crate::deviation::{MissingMotions, MotionStatus, PathPoint};
 use crate::plan::reason::OutcomeReason;
 use crate::plan::steps_to_left::StepsToLeft;
 use crate::risk::cut_risk::CutRisk;
@@ -25,7 +25,7 @@ pub struct MotionOutcome {
     /// Index into the listing.
     pub motion: u32,
     /// Changed, flagged, refused or left.
-    pub status: Status,
+    pub status: MotionStatus,
     /// Reason for that status; most motions have none.
     pub reason: Option<Box<OutcomeReason>>,
     /// Deviation of its end before and after (mm).
@@ -52,7 +52,7 @@ impl MotionOutcome {
     pub(crate) fn left(motion: u32) -> Self {
         Self {
             motion,
-            status: Status::Left,
+            status: MotionStatus::Left,
             reason: None,
             before_mm: OptionF64::NONE,
             after_mm: OptionF64::NONE,
@@ -97,7 +97,7 @@ impl Plan {
         MissingMotions::of(listing, |motion| match self.outcomes.get(motion as usize) {
             Some(outcome) if outcome.before_mm.get().is_some() => None,
             Some(outcome) => Some((outcome.status, outcome.reason().map(|reason| reason.to_string()))),
-            None => Some((Status::Left, None)),
+            None => Some((MotionStatus::Left, None)),
         })
     }
 }

@@ -12,10 +12,10 @@ use truegrind_arm::inverse::budget::SearchBudget;
 use truegrind_math::work::checkpoint;
 
 /// Motions per parallel work item.
-pub(crate) const PORTION: usize = 64;
+pub(crate) const CHUNK: usize = 64;
 
 /// Motions that are processed in less time than another thread takes to wake up.
-pub(crate) const MANY: usize = 4096;
+pub(crate) const MANY_MOTIONS: usize = 4096;
 
 /// Runs pieces in parallel, each with its share of the budget; pieces that ran out are repeated one after the other with the
 /// budget that others left over.

@@ -20,7 +20,7 @@ use crate::arms::Arms;
 use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
 use crate::deviation::{
-    After, Deviation, MissingMotions, ON_SURFACE_MM, PathPoint, PathReport, Status, files_of,
+    After, Deviation, MissingMotions, MotionStatus, ON_SURFACE_MM, PathPoint, PathReport, files_of,
 };
 use crate::frames::frame_table::FrameTable;
 use crate::plan::reason::OutcomeReason;
@@ -152,7 +152,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         missing: MissingMotions::of(task.original, |motion| {
             let (_, reason) =
                 without_end.get(without_end.binary_search_by_key(&motion, |(of, _)| *of).ok()?)?;
-            Some((Status::Left, Some(reason.to_string())))
+            Some((MotionStatus::Left, Some(reason.to_string())))
         }),
         differences,
         between,
@@ -204,7 +204,7 @@ fn path_point(
         }),
         shape_sigma_mm: None,
         outside: acting_arm.knowledge.and_then(|k| k.region.outside(&joints)),
-        status: if second.is_some() && !same { Status::Changed } else { Status::Left },
+        status: if second.is_some() && !same { MotionStatus::Changed } else { MotionStatus::Left },
         reason: same.then(|| "same as in the original".to_owned()),
     }
 }

@@ -404,7 +404,7 @@ pub trait SinCos: Real {
 impl SinCos for f64 {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn sin_cos_wide(self) -> (Self, Self) {
-        if self.abs() < LARGEST_REDUCED { sin_cos_reduced(self) } else { self.sin_cos() }
+        if self.abs() < MAX_REDUCED { sin_cos_reduced(self) } else { self.sin_cos() }
     }
 
     #[inline(always)]
@@ -421,7 +421,7 @@ impl<S: Simd> SinCos for Lanes<S> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn sin_cos_wide(self) -> (Self, Self) {
         let Self(simd, value) = self;
-        let small = simd.less_than_f64s(simd.abs_f64s(value), simd.splat_f64s(LARGEST_REDUCED));
+        let small = simd.less_than_f64s(simd.abs_f64s(value), simd.splat_f64s(MAX_REDUCED));
         if simd.first_true_m64s(simd.not_m64s(small)) < S::F64_LANES {
             let (sine, cosine) = one_by_one(self.spread());
             return (self.gathered(&sine), self.gathered(&cosine));
@@ -454,7 +454,7 @@ fn one_by_one(lanes: [f64; WIDTH]) -> ([f64; WIDTH], [f64; WIDTH]) {
 }
 
 /// Largest argument for which three parts of π/2 are accurate enough.
-const LARGEST_REDUCED: f64 = 1.0e5;
+const MAX_REDUCED: f64 = 1.0e5;
 
 #[cfg_attr(not(debug_assertions), inline(always))]
 #[expect(clippy::excessive_precision, reason = "the constants as fdlibm prints them")]

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, Dyn, Matrix6, SVD, SymmetricEigen, U6, Vector6};
 
 /// Iteration limit per row; some two or three are needed.
-const MOST_STEPS: usize = 200;
+const MAX_STEPS: usize = 200;
 
 /// Tolerance of nalgebra's own iterations.
 const PRECISION: f64 = 5.0 * f64::EPSILON;
@@ -30,7 +30,7 @@ pub fn svd(matrix: &Matrix6<f64>, directions: bool) -> Option<SVD<f64, U6, U6>> 
     if !matrix.iter().all(|v| v.is_finite()) {
         return None;
     }
-    SVD::try_new(*matrix, false, directions, PRECISION, 6 * MOST_STEPS)
+    SVD::try_new(*matrix, false, directions, PRECISION, 6 * MAX_STEPS)
 }
 
 /// Eigenvalues and eigenvectors of a symmetric matrix; `None` for one that is not finite.
@@ -38,6 +38,6 @@ pub fn symmetric_eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>>
     if !matrix.iter().all(|v| v.is_finite()) {
         return None;
     }
-    let most = MOST_STEPS * matrix.nrows().max(1);
+    let most = MAX_STEPS * matrix.nrows().max(1);
     SymmetricEigen::try_new(matrix, f64::EPSILON, most)
 }

@@ -28,7 +28,7 @@ use truegrind_calibration::measurement::split;
 use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_compensation::compensate::compensate;
 use truegrind_compensation::cut::Cuts;
-use truegrind_compensation::deviation::{After, Block, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{After, Block, MotionStatus, PathPoint, PathReport};
 use truegrind_compensation::options::Options as RewriteBounds;
 use truegrind_compensation::risk::placement::Placement;
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
@@ -125,8 +125,8 @@ impl GrindingRow {
 }
 
 /// Bounds of a correction (mm, rad), far above those of `compensate` (10 mm, 2°).
-const LARGEST_CORRECTION_MM: f64 = 100.0;
-const LARGEST_TURN_RAD: f64 = 0.35;
+const MAX_CORRECTION_MM: f64 = 100.0;
+const MAX_TURN_RAD: f64 = 0.35;
 
 /// The arm that grinds.
 #[derive(Debug, Clone, Copy)]
@@ -355,8 +355,8 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
     // centimetres; the wide bounds let such corrections pass, so that their consequence is measured.
     let bounds = RewriteBounds {
         condition: shop.condition,
-        max_correction_mm: LARGEST_CORRECTION_MM,
-        max_rotation_rad: LARGEST_TURN_RAD,
+        max_correction_mm: MAX_CORRECTION_MM,
+        max_rotation_rad: MAX_TURN_RAD,
         cuts: Cuts::Single,
         joint_gain: f64::INFINITY,
         placement: Placement::Absolute,
@@ -375,7 +375,7 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
             return (case, None);
         }
     };
-    let refused = |p: &&PathPoint| p.status == Status::Refused;
+    let refused = |p: &&PathPoint| p.status == MotionStatus::Refused;
     case.refused = planned.points.iter().filter(refused).count();
     let changed = Program::read(&[(shop.name, bytes.as_slice())], shop.setup);
     let judged = VerificationTask {

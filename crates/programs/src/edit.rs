@@ -79,7 +79,7 @@ impl PartialEq for Edits {
 impl Eq for Edits {}
 
 /// Edits applied by one thread at a time.
-const PORTION: usize = 1 << 15;
+const CHUNK: usize = 1 << 15;
 
 impl Edits {
     /// No edits.
@@ -254,14 +254,14 @@ impl Edits {
         if !self.entries().is_sorted_by_key(|entry| (entry.start, entry.end)) {
             sorted.to_mut().sort()?;
         }
-        // For each portion: the start of the source bytes before its first edit, and the length of its output.
+        // For each extent: the start of the source bytes before its first edit, and the length of its output.
         let chunks = || {
             sorted
                 .parts
                 .iter()
-                .flat_map(|part| part.entries.chunks(PORTION).map(|entries| (entries, &part.text)))
+                .flat_map(|part| part.entries.chunks(CHUNK).map(|entries| (entries, &part.text)))
         };
-        let mut portions: Vec<(usize, usize)> = Vec::new();
+        let mut extents: Vec<(usize, usize)> = Vec::new();
         let mut last = 0..0;
         for (entries, _) in chunks() {
             let (from, mut length) = (last.end, 0);
@@ -276,13 +276,13 @@ impl Edits {
                 length += range.start - last.end + (entry.text_end - entry.text_start) as usize;
                 last = range;
             }
-            portions.push((from, length));
+            extents.push((from, length));
         }
         let rest = &source[last.end..];
-        let mut out = vec![0; portions.iter().map(|portion| portion.1).sum::<usize>() + rest.len()];
-        let mut work = Vec::with_capacity(portions.len());
+        let mut out = vec![0; extents.iter().map(|extent| extent.1).sum::<usize>() + rest.len()];
+        let mut work = Vec::with_capacity(extents.len());
         let mut open = out.as_mut_slice();
-        for ((entries, text), (from, length)) in chunks().zip(portions) {
+        for ((entries, text), (from, length)) in chunks().zip(extents) {
             let (place, after) = open.split_at_mut(length);
             work.push((entries, text, from, place));
             open = after;

@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub use axis_turn::AxisTurn;
 pub use reason::{OpaqueReason, Reason};
 use smallvec::SmallVec;
-pub use target::{FARTHEST_MM, Frame, JointTarget, RobTarget, TargetValue};
+pub use target::{Frame, JointTarget, MAX_POSITION_MM, RobTarget, TargetValue};
 
 /// A range of bytes of one file, end excluded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
@@ -648,7 +648,7 @@ impl Listing {
             Some(
                 Reason::Assigned
                 | Reason::AfterProbing
-                | Reason::HandedOver
+                | Reason::Escaped
                 | Reason::Parameter
                 | Reason::UnknownFlow,
             ) => true,
@@ -677,7 +677,7 @@ impl Listing {
             Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange | Reason::AfterProbing))) => {
                 return Some(*reason);
             }
-            Some(Err(Reason::HandedOver)) => return Some(Reason::ToolHandedOver),
+            Some(Err(Reason::Escaped)) => return Some(Reason::ToolEscaped),
             Some(Err(Reason::Parameter)) => return Some(Reason::ToolParameter),
             Some(Err(_)) => return Some(Reason::ToolUnknown),
             None => return Some(Reason::MissingArgument),
@@ -690,7 +690,7 @@ impl Listing {
             Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange | Reason::AfterProbing))) => {
                 Some(*reason)
             }
-            Some(Err(Reason::HandedOver)) => Some(Reason::WorkObjectHandedOver),
+            Some(Err(Reason::Escaped)) => Some(Reason::WorkObjectEscaped),
             Some(Err(Reason::Parameter)) => Some(Reason::WorkObjectParameter),
             _ => Some(Reason::WorkObjectUnknown),
         }

@@ -34,9 +34,9 @@ pub enum NewTarget {
 }
 
 /// Limits of positions (mm) and angles (°) that a control can read. A target may be read up to
-/// [`FARTHEST_MM`](crate::motion::FARTHEST_MM), and what is corrected lies beyond it by a tool and a work object.
-const LARGEST_WRITTEN_MM: f64 = 1e7;
-const LARGEST_WRITTEN_DEG: f64 = 1e6;
+/// [`MAX_POSITION_MM`](crate::motion::MAX_POSITION_MM), and what is corrected lies beyond it by a tool and a work object.
+const MAX_WRITTEN_MM: f64 = 1e7;
+const MAX_WRITTEN_DEG: f64 = 1e6;
 
 impl NewTarget {
     /// Whether a control can represent its numbers.
@@ -45,11 +45,9 @@ impl NewTarget {
             NewTarget::Keep | NewTarget::Drop => true,
             NewTarget::Cartesian { position_mm, quaternion, .. } => {
                 let square: f64 = quaternion.iter().map(|q| q * q).sum();
-                position_mm.iter().all(|x| x.abs() <= LARGEST_WRITTEN_MM) && (0.25..=4.0).contains(&square)
+                position_mm.iter().all(|x| x.abs() <= MAX_WRITTEN_MM) && (0.25..=4.0).contains(&square)
             }
-            NewTarget::Joint { robot_deg } => {
-                robot_deg.iter().all(|angle| angle.abs() <= LARGEST_WRITTEN_DEG)
-            }
+            NewTarget::Joint { robot_deg } => robot_deg.iter().all(|angle| angle.abs() <= MAX_WRITTEN_DEG),
         }
     }
 }
@@ -122,7 +120,7 @@ impl Default for RewriteOptions {
 
 /// The outcome of one change.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Outcome {
+pub enum RewriteOutcome {
     /// Equal to the source within the written decimals: no byte changed.
     Unchanged,
     /// The numbers were replaced in place (in the instruction or in the declaration).
@@ -150,5 +148,5 @@ pub struct Rewritten {
     /// One per file, in the order in which the files were given.
     pub files: Vec<FileEdits>,
     /// One per change, in the same order.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<RewriteOutcome>,
 }

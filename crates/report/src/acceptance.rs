@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
+use super::document::{Block, Document, KeyFigure, PageVerdict, Provenance, Source};
 use super::plot::{Axis, Graph, Histogram, Ink, Reference, Sample, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -10,7 +10,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_calibration::acceptance::orientation::Orientation;
 use truegrind_calibration::acceptance::path::{PATH_CYCLES, PATH_POINTS, PathFound};
 use truegrind_calibration::acceptance::{
-    Acceptance, Decision, FEWEST_POSES, ISO_CYCLES, ISO_POSES, LEAST_SHARE, Uncertainty, Uncounted,
+    Acceptance, Decision, ISO_CYCLES, ISO_POSES, MIN_POSES, MIN_SHARE, Uncertainty, Uncounted,
 };
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind_math::statistics::ErrorSummary;
@@ -82,9 +82,9 @@ pub fn is_accepted(found: &Acceptance) -> bool {
 const OTHER_ARM_MM: f64 = 25.0;
 
 /// Share of a joint's range in the fit below which the verdict says how little was tested.
-const LEAST_COVERAGE: f64 = 0.5;
+const MIN_COVERAGE: f64 = 0.5;
 
-fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
+fn verdict(found: &Acceptance, sensor: Sensor) -> PageVerdict {
     let (status, headline) = headline(found);
     let mut reasons = Vec::new();
     match found.uncertainty {
@@ -132,7 +132,7 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
             found.nominal.rmse, found.model.rmse
         ));
     }
-    if let Some(coverage) = found.coverage.filter(|coverage| coverage.share() < LEAST_COVERAGE) {
+    if let Some(coverage) = found.coverage.filter(|coverage| coverage.share() < MIN_COVERAGE) {
         reasons.push(format!(
             "joint {} was tested over {:.0}° of the {:.0}° that the fit covers: nothing is known beyond",
             coverage.joint + 1,
@@ -143,7 +143,7 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
     if sensor == Sensor::Cable {
         reasons.push("a cable measures errors only along itself; errors across it are not judged".to_owned());
     }
-    Verdict::new(status, headline, reasons)
+    PageVerdict::new(status, headline, reasons)
 }
 
 /// Digits after the point that show a length (mm): three, or two significant ones where it is smaller.
@@ -182,9 +182,9 @@ fn tested(found: &Acceptance) -> String {
         return volume;
     }
     format!(
-        "{volume}, where at least {:.0} % are required: measure at least {FEWEST_POSES} poses all over the volume in which the arm works, \
+        "{volume}, where at least {:.0} % are required: measure at least {MIN_POSES} poses all over the volume in which the arm works, \
          with different orientations",
-        100.0 * LEAST_SHARE
+        100.0 * MIN_SHARE
     )
 }
 
@@ -239,7 +239,7 @@ fn headline(found: &Acceptance) -> (Status, String) {
         ),
         Decision::NotEvaluated => (
             Status::NotEvaluated,
-            format!("{} poses are too few: at least {FEWEST_POSES} are required", found.poses),
+            format!("{} poses are too few: at least {MIN_POSES} are required", found.poses),
         ),
     }
 }
@@ -368,7 +368,7 @@ pub fn orientation_table(found: &Acceptance) -> Table {
     let remark = match (turns.tolerance_rad, turns.decision) {
         (None, _) => "not evaluated: no tolerance was stated (--tolerance-angle)".to_owned(),
         (_, Decision::NotEvaluated) => {
-            format!("not evaluated: {} poses, at least {FEWEST_POSES} are required", found.poses)
+            format!("not evaluated: {} poses, at least {MIN_POSES} are required", found.poses)
         }
         (_, decision) => word(decision).to_owned(),
     };

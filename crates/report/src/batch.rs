@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::compensation::verdict as verdict_of_program;
-use super::document::{Document, KeyFigure, Verdict};
+use super::document::{Document, KeyFigure, PageVerdict};
 use super::kept;
 use super::placement::{self, Placed};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
-use truegrind_compensation::deviation::Status as MotionStatus;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::frames::undeclared::undeclared;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -384,7 +384,7 @@ pub fn summary(rows: &[Row]) -> Document {
     page.push(display_table(rows));
     if rows.len() > SCREEN {
         // The top of a long table has scrolled away.
-        page.push(Verdict { reasons: Vec::new(), ..verdict });
+        page.push(PageVerdict { reasons: Vec::new(), ..verdict });
     }
     page
 }
@@ -427,7 +427,7 @@ fn title(rows: &[Row]) -> String {
     }
 }
 
-fn verdict(rows: &[Row]) -> Verdict {
+fn verdict(rows: &[Row]) -> PageVerdict {
     let failed: Vec<&Row> = rows.iter().filter(|row| row.ended == Ended::Failed).collect();
     let [_, changed, flagged, ..] = totals(rows);
     let may_run = rows.iter().filter(|row| row.ended == Ended::Changed && row.is_clean()).count();
@@ -491,7 +491,7 @@ fn verdict(rows: &[Row]) -> Verdict {
             missing.len() - MAX_MISSING
         ));
     }
-    Verdict::new(status, headline, reasons)
+    PageVerdict::new(status, headline, reasons)
 }
 
 /// Names in lower case, each once.

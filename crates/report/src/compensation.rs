@@ -11,7 +11,7 @@ use super::deviation::{Risk, sections, status_cell, status_word};
 use super::document::{Block, Document};
 use super::placement;
 use super::table::{Cell, Column, Table};
-use truegrind_compensation::deviation::{PathReport, Status as MotionStatus};
+use truegrind_compensation::deviation::{MotionStatus, PathReport};
 use truegrind_compensation::plan::reason::{Figure, OutcomeReason};
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Place};
@@ -34,7 +34,7 @@ const MAX_RANGES: usize = 6;
 const ROWS_ON_PAGE: usize = 600;
 
 /// Rows of the table of largest deviations.
-const LARGEST: usize = 8;
+const MAX_LISTED: usize = 8;
 
 /// One row per motion; `files` in the order of the listing.
 pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
@@ -97,7 +97,7 @@ fn largest_deviations(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> 
     let mut known: Vec<(f64, &MotionOutcome)> =
         plan.outcomes.iter().filter_map(|outcome| Some((outcome.before_mm.get()?, outcome))).collect();
     known.sort_by(|a, b| b.0.total_cmp(&a.0));
-    known.truncate(LARGEST);
+    known.truncate(MAX_LISTED);
     let only =
         Plan { outcomes: known.into_iter().map(|(_, outcome)| outcome.clone()).collect(), ..Plan::default() };
     let mut table = table(&only, listing, files);

@@ -24,7 +24,7 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::region::Outside;
 use truegrind_compensation::deviation::{
-    After, Deviation, MissingMotion, PathPoint, PathReport, Status as MotionStatus,
+    After, Deviation, MissingMotion, MotionStatus, PathPoint, PathReport,
 };
 
 pub use kept::{from_kept, kept};

@@ -133,7 +133,7 @@ pub fn summary(found: &Diagnosed) -> Document {
     page.push(answer::verdict(diagnosis));
     answer::blocks(diagnosis).into_iter().for_each(|block| page.push(block));
     diagnosis.findings.iter().filter(|finding| !finding.sessions.is_empty()).for_each(|finding| {
-        page.push(sessions(finding).excerpt(MOST_SESSIONS));
+        page.push(sessions(finding).excerpt(MAX_SESSIONS));
     });
     page.push(super::identification::judged(&found.estimated));
     if !diagnosis.transfers.is_empty() {
@@ -143,7 +143,7 @@ pub fn summary(found: &Diagnosed) -> Document {
 }
 
 /// Sessions shown before the findings' own sections.
-const MOST_SESSIONS: usize = 9;
+const MAX_SESSIONS: usize = 9;
 
 fn key_figures(found: &Diagnosed) -> Vec<KeyFigure> {
     let diagnosis = &found.diagnosis;

@@ -7,11 +7,11 @@ use super::table::{Cell, Table};
 /// A document, independent of the format.
 ///
 /// ```
-/// use truegrind_report::document::{Block, Document, Verdict};
+/// use truegrind_report::document::{Block, Document, PageVerdict};
 /// use truegrind_report::format::html;
 /// use truegrind_report::status::Status;
 /// let mut page = Document::new("Identification of abb-irb-120");
-/// page.push(Verdict::new(Status::Good, "The model may be used", ["converged", "rank 27 of 27"]));
+/// page.push(PageVerdict::new(Status::Good, "The model may be used", ["converged", "rank 27 of 27"]));
 /// page.heading(2, "Residuals");
 /// page.paragraph("Cable lengths, measured minus predicted.");
 /// assert!(html::document(&page).starts_with("<!doctype html>"));
@@ -43,7 +43,7 @@ pub enum Block {
     /// A plot.
     Figure(Figure),
     /// A verdict with its reasons.
-    Verdict(Verdict),
+    Verdict(PageVerdict),
     /// Details for some readers; collapsed in HTML.
     Details {
         /// Heading of the collapsed part.
@@ -130,7 +130,7 @@ impl Figure {
 
 /// A verdict with its reasons.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub struct PageVerdict {
     /// Status.
     pub status: Status,
     /// One sentence.
@@ -139,7 +139,7 @@ pub struct Verdict {
     pub reasons: Vec<String>,
 }
 
-impl Verdict {
+impl PageVerdict {
     /// A verdict with its reasons.
     pub fn new<S: Into<String>>(
         status: Status,
@@ -258,8 +258,8 @@ impl From<Figure> for Block {
     }
 }
 
-impl From<Verdict> for Block {
-    fn from(verdict: Verdict) -> Self {
+impl From<PageVerdict> for Block {
+    fn from(verdict: PageVerdict) -> Self {
         Block::Verdict(verdict)
     }
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::diagnosis;
-use super::document::{Document, KeyFigure, Verdict};
+use super::document::{Document, KeyFigure, PageVerdict};
 use super::kept;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -304,7 +304,7 @@ fn one_robot(rows: &[Row]) -> Option<&str> {
     robots.all(|robot| robot == first).then_some(first)
 }
 
-fn verdict(rows: &[Row]) -> Verdict {
+fn verdict(rows: &[Row]) -> PageVerdict {
     let failed: Vec<&Row> = rows.iter().filter(|row| row.failed).collect();
     let with_causes = rows.iter().filter(|row| !row.causes.is_empty()).count();
     let status = match (failed.is_empty(), with_causes) {
@@ -332,7 +332,7 @@ fn verdict(rows: &[Row]) -> Verdict {
     if let Some((row, cause)) = first.and_then(|row| Some((row, row.largest()?))) {
         reasons.push(format!("{}: what to do: {} ({})", row.file, cause.remedy, cause.sentence));
     }
-    Verdict::new(status, headline, reasons)
+    PageVerdict::new(status, headline, reasons)
 }
 
 fn heading(rows: &[Row]) -> Document {

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use self::parameter::{held_by_prior, in_unit};
 use self::tables::row_number;
-use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
+use super::document::{Block, Document, KeyFigure, PageVerdict, Provenance, Source};
 use super::number::Precision;
 use super::status::Status;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, ReasonKind};
@@ -210,12 +210,12 @@ fn parameter_json(parameter: &EstimatedParameter) -> Value {
     })
 }
 
-fn verdict(found: &Identification) -> Verdict {
+fn verdict(found: &Identification) -> PageVerdict {
     judged(&found.estimated)
 }
 
 /// The verdict on an estimated arm, the same for identification and diagnosis.
-pub fn judged(estimated: &Estimated) -> Verdict {
+pub fn judged(estimated: &Estimated) -> PageVerdict {
     let (before, after) = (estimated.registered.held_out.rmse, estimated.calibrated.held_out.rmse);
     // A diagnosis has a second held-out error beside it: that of the fit with all causes.
     let of = if estimated.provenance.method == "diagnose" { " of the written arm" } else { "" };
@@ -262,7 +262,7 @@ pub fn judged(estimated: &Estimated) -> Verdict {
                 .into(),
         );
     }
-    Verdict::new(status, headline, reasons.into_iter().map(|reason| reason.text))
+    PageVerdict::new(status, headline, reasons.into_iter().map(|reason| reason.text))
 }
 
 /// Whether its verdict notes that repeated poses show more than noise.

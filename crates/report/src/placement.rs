@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::table::{Column, Table};
-use truegrind_calibration::identification::verdict::{LEAST_PERCENT, MOST_PERCENT, percent_of};
+use truegrind_calibration::identification::verdict::{MAX_PERCENT, MIN_PERCENT, percent_of};
 use truegrind_compensation::line_list::numbered;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::cut_risk::CutRisk;
@@ -309,7 +309,7 @@ pub fn risk(plan: &Plan) -> Option<String> {
 
 /// "At most 3.0 %", or the bound that [`percent_of`] states.
 fn at_most(probability: f64) -> String {
-    let bounds = LEAST_PERCENT..=MOST_PERCENT;
+    let bounds = MIN_PERCENT..=MAX_PERCENT;
     let percent = percent_of(probability);
     if bounds.contains(&(100.0 * probability)) { format!("at most {percent}") } else { percent }
 }

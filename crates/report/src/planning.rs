@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Block, Document, KeyFigure, Verdict};
+use super::document::{Block, Document, KeyFigure, PageVerdict};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::parameter::Parameter;
@@ -137,7 +137,7 @@ fn poses(plan: &Plan) -> String {
     }
 }
 
-fn verdict(plan: &Plan, setup: &MeasurementSetup<'_>) -> Verdict {
+fn verdict(plan: &Plan, setup: &MeasurementSetup<'_>) -> PageVerdict {
     let minutes = plan.rows.last().map_or(0.0, |row| 60.0 * row.time_h);
     let mut reasons = vec![
         format!(
@@ -196,7 +196,7 @@ fn verdict(plan: &Plan, setup: &MeasurementSetup<'_>) -> Verdict {
         ),
         _ => (Status::Warning, "The program may run if the cable is unhooked between some poses"),
     };
-    Verdict::new(status, headline, reasons)
+    PageVerdict::new(status, headline, reasons)
 }
 
 /// Says that a target on the axis of joint 6 shows nothing of that joint.

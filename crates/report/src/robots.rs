@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Block, Document, Figure, KeyFigure, Verdict};
+use super::document::{Block, Document, Figure, KeyFigure, PageVerdict};
 use super::number::MISSING;
 use super::plot::{Axis, PlanPath, PlanView};
 use super::status::Status;
@@ -247,7 +247,7 @@ pub fn document(robot: &Robot) -> Document {
 /// What is not sure about a robot file.
 fn reservations(robot: &Robot) -> Option<Block> {
     (!robot.warnings.is_empty()).then(|| {
-        Verdict::new(
+        PageVerdict::new(
             Status::Warning,
             "The robot file can be used with reservations",
             robot.warnings.iter().cloned(),

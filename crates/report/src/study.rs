@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Document, KeyFigure, Provenance, Source, Verdict};
+use super::document::{Document, KeyFigure, PageVerdict, Provenance, Source};
 use super::number::Precision;
 use super::plot::{Axis, Graph, Series};
 use super::repeated;
@@ -62,7 +62,7 @@ pub fn document(rows: &[MethodRow], robot: &str, dataset: &Dataset) -> Document 
             })
             .collect();
         let status = if stuck.is_empty() { Status::Good } else { Status::Warning };
-        page.push(Verdict::new(status, headline, stuck));
+        page.push(PageVerdict::new(status, headline, stuck));
         page.push(vec![
             KeyFigure::new("Best held-out RMSE", Cell::with_sigma(rmse, spread), 3, "mm").note(best),
             KeyFigure::new("Registered frames alone", registered, 3, "mm").note("nominal links"),

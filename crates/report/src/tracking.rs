@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
+use super::document::{Block, Document, KeyFigure, PageVerdict, Provenance, Source};
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -104,7 +104,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     }
     reasons.extend(gain.as_ref().map(gain_sentence));
     reasons.extend(noise_sentences(tracker));
-    page.push(Verdict::new(status, headline, reasons));
+    page.push(PageVerdict::new(status, headline, reasons));
     page.push(key_figures(tracker, alarms.len(), departure.as_ref()));
     page.paragraph(format!("Model written: {model}"));
 }

@@ -10,9 +10,9 @@ use crate::error::SurfaceError;
 use crate::surface::Surface;
 
 /// Terms of equations evaluated for one path: some seconds.
-const MOST_TERMS: f64 = 2e8;
+const MAX_TERMS: f64 = 2e8;
 /// Candidate steps tested while equal steps are searched for; after that each step is as long as the bounds allow.
-const MOST_TRIALS: usize = 20_000_000;
+const MAX_TRIALS: usize = 20_000_000;
 
 /// The remaining budget of one path.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ pub(crate) struct Budget {
 
 impl Budget {
     pub(crate) fn of(surface: &Surface) -> Self {
-        Self { terms: Cell::new(MOST_TERMS), trials: Cell::new(MOST_TRIALS), cost: surface.evaluation_cost() }
+        Self { terms: Cell::new(MAX_TERMS), trials: Cell::new(MAX_TRIALS), cost: surface.evaluation_cost() }
     }
 
     /// Charges `evaluations` evaluations of the surface.
@@ -34,7 +34,7 @@ impl Budget {
     /// [`SurfaceError::TooMuchWork`] where the budget is exhausted.
     pub(crate) fn charge(&self, evaluations: usize) -> Result<(), SurfaceError> {
         self.terms.set(self.terms.get() - self.cost * evaluations as f64);
-        if self.terms.get() >= 0.0 { Ok(()) } else { Err(SurfaceError::TooMuchWork { terms: MOST_TERMS }) }
+        if self.terms.get() >= 0.0 { Ok(()) } else { Err(SurfaceError::TooMuchWork { terms: MAX_TERMS }) }
     }
 
     /// Charges one candidate step; `false` where none is left.

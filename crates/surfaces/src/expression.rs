@@ -7,7 +7,7 @@
 //! **Shapes.** Up to three variables; a gradient of three, a symmetric 3 × 3 matrix of second derivatives (unused
 //! rows zero).
 //!
-//! **Stops.** A text longer than [`LONGEST`] characters or nested deeper than [`DEEPEST`] is refused. The work of an
+//! **Stops.** A text longer than [`MAX_CHARACTERS`] characters or nested deeper than [`MAX_DEPTH`] is refused. The work of an
 //! evaluation grows with the length of the text.
 //!
 //! **Source and departures.** Griewank and Walther, *Evaluating Derivatives*, 2nd ed., ch. 3 and 13. A derivative that
@@ -28,9 +28,9 @@ use std::f64::consts::LN_10;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Longest text that is read, in characters.
-pub const LONGEST: usize = 2000;
+pub const MAX_CHARACTERS: usize = 2000;
 /// Deepest nesting that is read.
-pub const DEEPEST: usize = 60;
+pub const MAX_DEPTH: usize = 60;
 /// The functions an equation may use.
 pub static FUNCTIONS: [Function; 14] = [
     Function("sin", f64::sin, |x, f| [x.cos(), -f]),
@@ -332,8 +332,12 @@ impl<'a> Reader<'a> {
     }
 
     fn whole(&mut self) -> Result<Part, ExpressionError> {
-        if self.characters.len() > LONGEST {
-            return Err(self.error(LONGEST, "more text", format!("at most {LONGEST} characters")));
+        if self.characters.len() > MAX_CHARACTERS {
+            return Err(self.error(
+                MAX_CHARACTERS,
+                "more text",
+                format!("at most {MAX_CHARACTERS} characters"),
+            ));
         }
         self.advance()?;
         let part = self.sum()?;
@@ -403,9 +407,9 @@ impl<'a> Reader<'a> {
 
     fn sum(&mut self) -> Result<Part, ExpressionError> {
         self.depth += 1;
-        if self.depth > DEEPEST {
+        if self.depth > MAX_DEPTH {
             return Err(
-                self.unexpected(&format!("at most {DEEPEST} nested parentheses, signs and exponents"))
+                self.unexpected(&format!("at most {MAX_DEPTH} nested parentheses, signs and exponents"))
             );
         }
         let mut left = self.product()?;
@@ -432,9 +436,9 @@ impl<'a> Reader<'a> {
 
     fn signed(&mut self) -> Result<Part, ExpressionError> {
         self.depth += 1;
-        if self.depth > DEEPEST {
+        if self.depth > MAX_DEPTH {
             return Err(
-                self.unexpected(&format!("at most {DEEPEST} nested parentheses, signs and exponents"))
+                self.unexpected(&format!("at most {MAX_DEPTH} nested parentheses, signs and exponents"))
             );
         }
         let part = match self.token {

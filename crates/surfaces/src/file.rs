@@ -75,11 +75,11 @@ pub const ZONES: [&str; 15] = [
     "fine", "z0", "z1", "z5", "z10", "z15", "z20", "z30", "z40", "z50", "z60", "z80", "z100", "z150", "z200",
 ];
 /// A frame closer to its parent than this, but not coincident with it, is assumed to be stated in metres.
-const NEAREST_MM: f64 = 2.0;
+const MIN_DISTANCE_MM: f64 = 2.0;
 /// Largest distance of a frame from its parent (mm).
-const FARTHEST_MM: f64 = 1e6;
+const MAX_DISTANCE_MM: f64 = 1e6;
 /// Largest speed [mm/s], mass (kg), radius (mm) or unit (mm).
-const MOST: f64 = 1e6;
+const MAX_QUANTITY: f64 = 1e6;
 
 /// Origin of a tool or work-object frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -337,7 +337,7 @@ impl Reporter<'_> {
     }
 
     fn positive(&self, key: &str, value: f64, expected: &str) -> Result<f64, SurfaceError> {
-        if (f64::MIN_POSITIVE..=MOST).contains(&value) {
+        if (f64::MIN_POSITIVE..=MAX_QUANTITY).contains(&value) {
             Ok(value)
         } else {
             Err(self.value(key, value.to_string(), expected, "correct the number"))
@@ -478,7 +478,7 @@ impl Reporter<'_> {
         let frame = self.frame("tool", stated.position_mm, stated.quaternion, stated.rpy_deg)?;
         let mass_kg =
             self.positive("tool.mass_kg", stated.mass_kg, "a mass above 0 in kg, up to 1,000,000")?;
-        if !stated.cog_mm.iter().all(|c| c.abs() <= FARTHEST_MM) {
+        if !stated.cog_mm.iter().all(|c| c.abs() <= MAX_DISTANCE_MM) {
             let found = format!("{:?}", stated.cog_mm);
             return Err(self.value(
                 "tool.cog_mm",
@@ -511,7 +511,7 @@ impl Reporter<'_> {
         let key = |key: &str| format!("{table}.{key}");
         let position = Vector3::from(position_mm);
         let away = position.norm();
-        if !(away <= FARTHEST_MM) || (away > 0.0 && away < NEAREST_MM) {
+        if !(away <= MAX_DISTANCE_MM) || (away > 0.0 && away < MIN_DISTANCE_MM) {
             let found = format!("{position_mm:?}");
             let remedy = "state millimetres; if these are metres, multiply them by 1000";
             return Err(self.value(&key("position_mm"), found, "a position in mm", remedy));

@@ -31,9 +31,9 @@ use crate::tessellation::Tessellation;
 /// Triangles that meet at a smaller angle than this share a smooth normal.
 const CREASE_RAD: f64 = std::f64::consts::FRAC_PI_6;
 /// A smaller mesh is assumed to be in metres or inches.
-const SMALLEST_MM: f64 = 2.0;
+const MIN_SIZE_MM: f64 = 2.0;
 /// Largest workpiece: a kilometre.
-const LARGEST_MM: f64 = 1e6;
+const MAX_SIZE_MM: f64 = 1e6;
 
 /// A surface of triangles, wound counter-clockwise seen from outside.
 #[derive(Clone)]
@@ -183,13 +183,13 @@ impl Mesh {
         }
         let (low, high) = bounds(&vertices);
         let across = (high - low).amax();
-        if across < SMALLEST_MM {
+        if across < MIN_SIZE_MM {
             return Err(wrong(
                 format!("is only {across} mm across"),
                 "STL has no unit: state unit_mm = 1000 for a file in metres, 25.4 for inches",
             ));
         }
-        if !(across <= LARGEST_MM && low.amax().max(high.amax()) <= LARGEST_MM) {
+        if !(across <= MAX_SIZE_MM && low.amax().max(high.amax()) <= MAX_SIZE_MM) {
             return Err(wrong(
                 format!("is {across:e} mm across or lies as far away"),
                 "check unit_mm, and that every vertex belongs to the part",

@@ -10,7 +10,7 @@
 //! work object).
 //!
 //! **Stops.** Never iterates without bound: the number of passes and points is known before they are made, and a
-//! path of more than [`PathOptions::LARGEST`] points is refused.
+//! path of more than [`PathOptions::MAX_POINTS`] points is refused.
 //!
 //! **Source and departures.** ltlm-2024, "Grinding compensation experiment", takes path points from the surface
 //! equation of the component and prints no more; pattern, spacing and frames here are the usual ones of
@@ -27,7 +27,7 @@ mod link;
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::budget::Budget;
-use super::sampling::{FINEST, Steps, Trace};
+use super::sampling::{MAX_CURVE_SAMPLES, Steps, Trace};
 use crate::contact::Contact;
 use crate::error::SurfaceError;
 use crate::surface::Surface;
@@ -106,7 +106,7 @@ struct Cut {
 ///
 /// # Errors
 /// Options out of range, a hollow into which the tool does not fit, a pattern that nowhere meets the surface, more than
-/// [`PathOptions::LARGEST`] points, or a fixed direction of the tool's x axis that is along the tool.
+/// [`PathOptions::MAX_POINTS`] points, or a fixed direction of the tool's x axis that is along the tool.
 pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, SurfaceError> {
     options.check()?;
     let budget = Budget::of(surface);
@@ -116,16 +116,16 @@ pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, 
     for curve in &curves {
         least += total_mm(trace(surface, curve, curve.initial_samples() / 4, &budget)?);
     }
-    if least / options.max_step_mm > PathOptions::LARGEST as f64 {
-        return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
+    if least / options.max_step_mm > PathOptions::MAX_POINTS as f64 {
+        return Err(SurfaceError::TooLong { limit: PathOptions::MAX_POINTS });
     }
     let mut passes = Vec::new();
     let mut count = 0;
     for curve in curves {
-        for pass in cuts(surface, &curve, options, PathOptions::LARGEST - count, &budget)? {
+        for pass in cuts(surface, &curve, options, PathOptions::MAX_POINTS - count, &budget)? {
             count += pass.len() + 2;
-            if count > PathOptions::LARGEST {
-                return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
+            if count > PathOptions::MAX_POINTS {
+                return Err(SurfaceError::TooLong { limit: PathOptions::MAX_POINTS });
             }
             passes.push(pass);
         }
@@ -170,7 +170,7 @@ fn cuts(
     let coarse = trace(surface, curve, curve.initial_samples(), budget)?;
     let gap_mm = coarse.iter().map(Trace::coarsest_mm).fold(0.0, f64::max);
     let finer = (8.0 * gap_mm / options.max_step_mm).ceil().max(1.0) as usize;
-    let mut intervals = curve.initial_samples().saturating_mul(finer).min(FINEST);
+    let mut intervals = curve.initial_samples().saturating_mul(finer).min(MAX_CURVE_SAMPLES);
     loop {
         let mut closest = usize::MAX;
         let runs: Vec<(Trace, Vec<f64>)> = trace(surface, curve, intervals, budget)?
@@ -189,11 +189,13 @@ fn cuts(
             })
             .collect();
         if runs.iter().map(|(_, shares)| shares.len()).sum::<usize>() > room {
-            return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
+            return Err(SurfaceError::TooLong { limit: PathOptions::MAX_POINTS });
         }
         // Steps over fewer than four samples are judged too coarsely: the chord error needs more, within
         // reason.
-        if closest < 4 && intervals < FINEST.min((64 * curve.initial_samples()).saturating_mul(finer)) {
+        if closest < 4
+            && intervals < MAX_CURVE_SAMPLES.min((64 * curve.initial_samples()).saturating_mul(finer))
+        {
             intervals *= 2;
             continue;
         }

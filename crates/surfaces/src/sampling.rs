@@ -14,7 +14,7 @@
 //! **Shapes.** A curve is a function of a share 0…1 to a point; what comes back are shares in ascending order, both
 //! ends included.
 //!
-//! **Stops.** A curve is sampled at no more than [`FINEST`] points.
+//! **Stops.** A curve is sampled at no more than [`MAX_CURVE_SAMPLES`] points.
 //!
 //! **Source and departures.** The cusp formula is derived here from the law of cosines; for small h and κ it is the
 //! √(8Rh) of the handbooks.
@@ -26,7 +26,7 @@ use nalgebra::Point3;
 use super::budget::Budget;
 
 /// Largest number of samples of a curve.
-pub const FINEST: usize = 1 << 20;
+pub const MAX_CURVE_SAMPLES: usize = 1 << 20;
 
 /// Distance of two passes on the surface in mm at which a ball of radius `tool_radius_mm` leaves a cusp of height
 /// `scallop_mm` where the surface's curvature across the passes is `curvature_per_mm` (positive: rounded outwards).

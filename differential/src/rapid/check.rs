@@ -177,7 +177,7 @@ const ROUNDING_RAD: f64 = 1e-5;
 /// Joints that differ by less (rad) are the same.
 const SAME_JOINTS_RAD: f64 = 1e-6;
 /// The largest change of a joint (rad) by a correction of millimetres.
-const MOST_JUMP: f64 = 0.1;
+const MAX_JUMP: f64 = 0.1;
 
 impl Comparison<'_> {
     fn wrong(&mut self, line: usize, kind: &'static str, text: String) {
@@ -366,9 +366,9 @@ impl Comparison<'_> {
         self.reaches(pair, &joints, &intended);
         if let Some(before) = told.joints {
             let jump = farthest(&joints, &before);
-            if jump > MOST_JUMP && guessed {
+            if jump > MAX_JUMP && guessed {
                 self.tally.guessed += 1;
-            } else if jump > MOST_JUMP {
+            } else if jump > MAX_JUMP {
                 let text = format!(
                     "a joint moves by {:.1}°: {:.3?} became {:.3?}, {:?}",
                     jump.to_degrees(),

@@ -15,15 +15,15 @@ const PIECES_WITH_PLAY: usize = 128;
 const PIECES_OF_ARCS: usize = 640;
 
 /// A joint that would have to go farther from one piece to the next has no way there (rad).
-const FARTHEST: f64 = 0.6;
+const MAX_JOINT_STEP_RAD: f64 = 0.6;
 
 /// How often a piece is halved before that is said.
 const HALVINGS: u32 = 6;
 
 /// Nearer points (mm), or such that its point and its end are seen from its start under a smaller angle (rad), make no arc: 0.1 mm
 /// and 1° (ABB, RAPID, limitations of `MoveC`).
-const NEAREST: f64 = 0.1;
-const NARROWEST: f64 = std::f64::consts::PI / 180.0;
+const MIN_DISTANCE_MM: f64 = 0.1;
+const MIN_ANGLE_RAD: f64 = std::f64::consts::PI / 180.0;
 
 /// What the controller was told at one goal, and what follows.
 #[derive(Debug, Clone)]
@@ -128,7 +128,7 @@ impl<'a> Course<'a> {
         let place = |flange: &Pose| tool_in_object(motion, flange).translation.vector;
         let from = place(from);
         let [via, to] = [via, to].map(|point| place(&point.flange) - from);
-        via.norm() >= NEAREST && to.norm() >= NEAREST && via.angle(&to) >= NARROWEST
+        via.norm() >= MIN_DISTANCE_MM && to.norm() >= MIN_DISTANCE_MM && via.angle(&to) >= MIN_ANGLE_RAD
     }
 
     /// The joints that the controller takes: those of the configuration, or without it those nearest to where it is.
@@ -159,7 +159,7 @@ impl<'a> Course<'a> {
         let count = points.len();
         let near_to = |point: &Point, near: &[f64; 6]| {
             let reached = self.arm.nominal_nearest(&point.flange, near);
-            reached.filter(|q| (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST))
+            reached.filter(|q| (0..6).all(|j| (q[j] - near[j]).abs() < MAX_JOINT_STEP_RAD))
         };
         let (last, before) = way.split_last().map_or((start, &way[..]), |(last, before)| (last.1, before));
         points[count - 1].joints = near_to(&points[count - 1], &last);
@@ -340,7 +340,7 @@ type Reach<'a> = dyn Fn(f64, &[f64; 6]) -> Option<[f64; 6]> + 'a;
 /// joints are fast, and the piece is halved.
 fn gone(joints: &Reach<'_>, piece: [f64; 2], near: [f64; 6], halvings: u32) -> Option<[f64; 6]> {
     let [from, to] = piece;
-    let steady = |q: &[f64; 6]| (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST);
+    let steady = |q: &[f64; 6]| (0..6).all(|j| (q[j] - near[j]).abs() < MAX_JOINT_STEP_RAD);
     if let Some(q) = joints(to, &near).filter(steady) {
         return Some(q);
     }

@@ -153,9 +153,9 @@ impl Destination {
 /// Follows a dangling link to its target; returns any other path unchanged.
 fn follow_links(named: &Path) -> anyhow::Result<PathBuf> {
     /// Limit of Linux.
-    const MOST: usize = 40;
+    const MAX_LINKS: usize = 40;
     let mut path = named.to_path_buf();
-    for _ in 0..MOST {
+    for _ in 0..MAX_LINKS {
         match fs::read_link(&path) {
             Ok(to) => path = parent(&path).join(to),
             Err(_) => return Ok(path),

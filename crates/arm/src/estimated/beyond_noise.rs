@@ -49,7 +49,7 @@ pub struct ErringArm<'a> {
 }
 
 /// Distance from its axis below which the flange does not tell the size of a joint (mm).
-const SMALLEST_MM: f64 = 60.0;
+const MIN_LEVER_MM: f64 = 60.0;
 
 impl ErringArm<'_> {
     /// RMS distance (mm) of a point on the flange from the axis of each joint.
@@ -73,7 +73,7 @@ impl ErringArm<'_> {
 
     /// The errors of the joints (rad) that displace the target by `beyond_mm`. `None` without poses.
     pub fn joint_errors_rad(&self, flange_from_target: &Pose, beyond_mm: f64) -> Option<[f64; 6]> {
-        let sizes = self.levers_mm(&Pose::identity()).map(|lever| lever.max(SMALLEST_MM).sqrt().recip());
+        let sizes = self.levers_mm(&Pose::identity()).map(|lever| lever.max(MIN_LEVER_MM).sqrt().recip());
         let by_sizes_mm = self.displacement_mm(flange_from_target, &sizes);
         (by_sizes_mm > 0.0).then(|| sizes.map(|size| size * beyond_mm / by_sizes_mm))
     }

@@ -27,11 +27,11 @@ const TIME_H: Bound = Bound::new(-1e6, 1e6, "a time in hours");
 const TEMPERATURE_C: Bound = Bound::new(-273.15, 2000.0, "a temperature in °C");
 
 /// Largest difference between estimated and nominal links: far more than any arm deviates (mm).
-const FARTHEST_MM: Bound = Bound::new(-200.0, 200.0, "a link within 200 mm of the nominal arm's");
+const MAX_LINK_CHANGE_MM: Bound = Bound::new(-200.0, 200.0, "a link within 200 mm of the nominal arm's");
 /// The same for angles (°).
-const FARTHEST_DEG: Bound = Bound::new(-45.0, 45.0, "a link within 45° of the nominal arm's");
+const MAX_LINK_CHANGE_DEG: Bound = Bound::new(-45.0, 45.0, "a link within 45° of the nominal arm's");
 /// Most samples of a region and parameters of a model.
-const MOST: usize = 100_000;
+const MAX_ENTRIES: usize = 100_000;
 
 /// Checks a model after reading; its two arms have passed their own checks.
 pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
@@ -93,14 +93,14 @@ fn arms(nominal: &Model, estimated: &Model) -> Result<(), InvalidValue> {
     }
     for (i, (from, to)) in nominal.links.iter().zip(&estimated.links).enumerate() {
         let key = |name: &str| format!("estimated.link {} {name}", i + 1);
-        FARTHEST_MM.check(|| key("a_mm less nominal"), to.a_mm - from.a_mm)?;
-        FARTHEST_MM.check(|| key("d_mm less nominal"), to.d_mm - from.d_mm)?;
+        MAX_LINK_CHANGE_MM.check(|| key("a_mm less nominal"), to.a_mm - from.a_mm)?;
+        MAX_LINK_CHANGE_MM.check(|| key("d_mm less nominal"), to.d_mm - from.d_mm)?;
         for (name, turn) in [
             ("alpha_deg less nominal", to.alpha_rad - from.alpha_rad),
             ("theta_deg less nominal", to.theta_rad - from.theta_rad),
             ("beta_deg less nominal", to.beta_rad - from.beta_rad),
         ] {
-            FARTHEST_DEG.check(|| key(name), turn.to_degrees())?;
+            MAX_LINK_CHANGE_DEG.check(|| key(name), turn.to_degrees())?;
         }
     }
     Ok(())
@@ -182,7 +182,7 @@ pub(super) fn region(region: &Region) -> Result<(), InvalidValue> {
             "min not above max",
         ));
     }
-    if region.samples_deg.len() > MOST {
+    if region.samples_deg.len() > MAX_ENTRIES {
         return Err(InvalidValue::new(
             "samples_deg",
             format!("{} poses", region.samples_deg.len()),

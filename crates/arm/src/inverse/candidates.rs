@@ -6,7 +6,7 @@ use nalgebra::UnitQuaternion;
 
 use super::budget;
 use super::configuration::{BRANCH_TOLERANCE, Configuration, QUARTER_AXES};
-use super::newton::{self, Goal, Outcome};
+use super::newton::{self, Goal, NewtonResult};
 use super::{Inverse, InverseError, Solution, same_branch};
 use crate::joints::Joints;
 use crate::limits::Limits;
@@ -37,8 +37,8 @@ impl Inverse<'_> {
         margins: &[f64; 3],
     ) -> Result<Solution, InverseError> {
         let found = self.branches(goal, Some(seed), margins, 0)?;
-        let mut best: Option<(bool, f64, &Outcome)> = None;
-        let mut other: Option<(f64, &Outcome)> = None;
+        let mut best: Option<(bool, f64, &NewtonResult)> = None;
+        let mut other: Option<(f64, &NewtonResult)> = None;
         for outcome in &found {
             let distance = (outcome.joints - seed).amax();
             if !same_branch(margins, &self.margins(&outcome.joints)) {
@@ -79,11 +79,11 @@ impl Inverse<'_> {
                 near.filter(|_| self.room(axis) > TAU).map_or_else(|| self.middle(axis), |near| near[axis])
             }
         });
-        let mut best: Option<([f64; 3], Outcome)> = None;
+        let mut best: Option<([f64; 3], NewtonResult)> = None;
         let mut nearest: Option<(f64, Joints)> = None;
         let mut outside = None;
         let mut found = self.branches(goal, near, &[1.0; 3], 0)?;
-        let fits = |o: &Outcome| {
+        let fits = |o: &NewtonResult| {
             let margins = self.margins(&o.joints);
             configuration.matches_branch_exactly(&margins)
                 && configuration.matches(&self.turned(goal, *o, &wanted).joints, &margins)
@@ -139,7 +139,7 @@ impl Inverse<'_> {
     pub fn solve_all_branches(&self, target: &Pose, near: &Joints) -> Vec<Joints> {
         let Ok(goal) = self.goal(target) else { return Vec::new() };
         let found = self.branches(&goal, Some(near), &self.margins(near), 0).unwrap_or_default();
-        let within = |o: &Outcome| self.check_limits(&o.joints).is_ok();
+        let within = |o: &NewtonResult| self.check_limits(&o.joints).is_ok();
         found.iter().filter(|o| within(o)).map(|o| o.joints).collect()
     }
 
@@ -167,7 +167,7 @@ impl Inverse<'_> {
         near: Option<&Joints>,
         margins: &[f64; 3],
         spread: usize,
-    ) -> Result<Vec<Outcome>, InverseError> {
+    ) -> Result<Vec<NewtonResult>, InverseError> {
         if budget::refuses() {
             return Err(InverseError::Abandoned);
         }
@@ -213,7 +213,7 @@ impl Inverse<'_> {
         if !search.found.is_empty() {
             return Ok(search.found);
         }
-        let miss = |o: &Outcome| o.residual_mm / self.kernel.length_mm + o.residual_rad;
+        let miss = |o: &NewtonResult| o.residual_mm / self.kernel.length_mm + o.residual_rad;
         let closest = search.stuck.into_iter().reduce(|a, b| if miss(&b) < miss(&a) { b } else { a });
         let Some(closest) = closest else { return Err(InverseError::NotFinite) };
         if beyond_mm.is_finite() && beyond_mm > 0.0 {
@@ -237,10 +237,10 @@ impl Inverse<'_> {
         &self,
         goal: &Goal,
         near: Option<&Joints>,
-        found: Vec<Outcome>,
-        fits: &dyn Fn(&Outcome) -> bool,
-    ) -> Vec<Outcome> {
-        let folded = |o: &Outcome| self.margins(&o.joints).iter().any(|m| m.abs() < NEAR_FOLD);
+        found: Vec<NewtonResult>,
+        fits: &dyn Fn(&NewtonResult) -> bool,
+    ) -> Vec<NewtonResult> {
+        let folded = |o: &NewtonResult| self.margins(&o.joints).iter().any(|m| m.abs() < NEAR_FOLD);
         let Some(map_inverse) = self.map_inverse.filter(|_| found.iter().any(folded)) else { return found };
         let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
         let mapped = self.arm.model.mapped(&around).into();
@@ -265,7 +265,7 @@ impl Inverse<'_> {
 
     /// The outcome with each joint on the turn nearest to `wanted`, solved again since effects may depend on the turn. A joint
     /// without a stated quarter keeps within its range where some turn does.
-    fn turned(&self, goal: &Goal, outcome: Outcome, wanted: &Joints) -> Outcome {
+    fn turned(&self, goal: &Goal, outcome: NewtonResult, wanted: &Joints) -> NewtonResult {
         let mut joints = on_nearest_turn(&outcome.joints, wanted);
         for axis in (0..6).filter(|axis| !QUARTER_AXES.contains(axis)) {
             let (low, high) = range(&self.arm.model.limits, axis);
@@ -319,8 +319,8 @@ struct Search<'s, 'a> {
     inverse: &'s Inverse<'a>,
     goal: &'s Goal,
     around: Joints,
-    found: Vec<Outcome>,
-    stuck: Vec<Outcome>,
+    found: Vec<NewtonResult>,
+    stuck: Vec<NewtonResult>,
 }
 
 impl Search<'_, '_> {

@@ -52,14 +52,14 @@ impl Goal {
 
 /// Result of the iteration.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Outcome {
+pub(super) struct NewtonResult {
     pub(super) joints: Joints,
     pub(super) residual_mm: f64,
     pub(super) residual_rad: f64,
     pub(super) iterations: usize,
 }
 
-impl Outcome {
+impl NewtonResult {
     pub(super) fn converged(&self) -> bool {
         self.residual_mm <= TOLERANCE_MM && self.residual_rad <= TOLERANCE_RAD
     }
@@ -119,10 +119,10 @@ fn rotation_vector(m: &Matrix3<f64>) -> Vector3<f64> {
 }
 
 /// Iterates from `start`. NaN ends it at once without convergence, and so does an exhausted budget.
-pub(super) fn solve(arm: &PreparedModel<'_>, goal: &Goal, start: &Joints, length_mm: f64) -> Outcome {
+pub(super) fn solve(arm: &PreparedModel<'_>, goal: &Goal, start: &Joints, length_mm: f64) -> NewtonResult {
     if budget::refuses() {
         let far = f64::INFINITY;
-        return Outcome { joints: *start, residual_mm: far, residual_rad: far, iterations: 0 };
+        return NewtonResult { joints: *start, residual_mm: far, residual_rad: far, iterations: 0 };
     }
     let mut here = state(arm, goal, *start, length_mm);
     let mut damping = 0.0_f64;
@@ -145,7 +145,7 @@ pub(super) fn solve(arm: &PreparedModel<'_>, goal: &Goal, start: &Joints, length
         }
     }
     budget::spend(iterations as u64 + 1);
-    Outcome {
+    NewtonResult {
         joints: here.joints,
         residual_mm: here.residual_mm,
         residual_rad: here.residual_rad,

@@ -17,7 +17,7 @@ const MAX_STRIDE_RAD: f64 = 0.35;
 /// Strides up to this size are extrapolated to the next eight seeds (rad).
 const STEADY_STRIDE_RAD: f64 = 0.05;
 /// Targets that one thread processes at a time; the results do not depend on it.
-const PORTION: usize = 1024;
+const CHUNK: usize = 1024;
 
 /// Joints that reach a target, with their configuration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,13 +155,13 @@ impl Inverse<'_> {
         evaluations: u64,
     ) -> Vec<Result<Solution, InverseError>> {
         let count = targets.len().min(seeds.len());
-        let portions = count.div_ceil(PORTION);
+        let chunks = count.div_ceil(CHUNK);
         targets[..count]
-            .par_chunks(PORTION)
-            .zip(seeds[..count].par_chunks(PORTION))
+            .par_chunks(CHUNK)
+            .zip(seeds[..count].par_chunks(CHUNK))
             .enumerate()
-            .flat_map_iter(|(portion, (targets, seeds))| {
-                let mut budget = SearchBudget::of(evaluations).share(portion, portions);
+            .flat_map_iter(|(chunk, (targets, seeds))| {
+                let mut budget = SearchBudget::of(evaluations).share(chunk, chunks);
                 with_budget(&mut budget, || {
                     let blocks = targets.chunks(WIDTH).zip(seeds.chunks(WIDTH));
                     let solved = blocks.flat_map(|(targets, seeds)| {

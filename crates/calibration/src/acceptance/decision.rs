@@ -1,7 +1,7 @@
 //! Decision rule for a largest error, its uncertainty and a tolerance (ISO 14253-1); the same for positions and orientations.
 
 /// Fewest poses for a decision.
-pub const FEWEST_POSES: usize = 100;
+pub const MIN_POSES: usize = 100;
 
 /// The decision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +38,7 @@ impl Decision {
         (uncertainty, source): (f64, Uncertainty),
         tolerance: f64,
     ) -> Self {
-        if poses < FEWEST_POSES || !largest.is_finite() {
+        if poses < MIN_POSES || !largest.is_finite() {
             Self::NotEvaluated
         } else if largest + uncertainty <= tolerance {
             if source == Uncertainty::Unknown { Self::Open } else { Self::Accepted }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::decision::FEWEST_POSES;
+use super::decision::MIN_POSES;
 use crate::identification::start::StartError;
 use crate::measurement::dataset::PathPoint;
 
@@ -29,7 +29,7 @@ pub enum AcceptError {
     /// The rows of the fit.
     #[error(
         "{file}: the model was fitted to these rows: an acceptance needs poses that were not used in the fit, at least \
-         {FEWEST_POSES}"
+         {MIN_POSES}"
     )]
     RowsOfTheFit {
         /// The file.
@@ -37,7 +37,7 @@ pub enum AcceptError {
     },
     /// All rows were read on paths.
     #[error(
-        "{file}: all rows were measured on paths (columns path, cycle, sample): an acceptance needs at least {FEWEST_POSES} poses \
+        "{file}: all rows were measured on paths (columns path, cycle, sample): an acceptance needs at least {MIN_POSES} poses \
          measured at rest, with these cells empty"
     )]
     PathsAlone {

@@ -17,7 +17,7 @@ use truegrind_arm::parameter::{Parameter, arm_parameters};
 
 /// Smallest share of the displacements over the region of the fit with which a test accepts an arm. A box of 300 mm with one orientation
 /// shows 5 % of an arm of 1.3 m and 15 % of one of 0.6 m; a box of 60 mm at most 2 %, one pose none.
-pub const LEAST_SHARE: f64 = 0.05;
+pub const MIN_SHARE: f64 = 0.05;
 
 /// Poses that are compared.
 const POSES: usize = 200;
@@ -34,7 +34,7 @@ pub struct Tested {
 impl Tested {
     /// Whether the poses show enough of the arm to accept it.
     pub fn is_enough(&self) -> bool {
-        self.share >= LEAST_SHARE
+        self.share >= MIN_SHARE
     }
 
     pub(super) fn of(dataset: &Dataset, estimated: &Estimated, frames: &Frames) -> Self {

@@ -13,7 +13,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 
 /// Shortest stretch (rad).
-const SHORTEST_RAD: f64 = TAU / 12.0;
+const MIN_STRETCH_RAD: f64 = TAU / 12.0;
 
 /// Fewest rows of a stretch.
 const ROWS: usize = 20;
@@ -42,7 +42,7 @@ pub fn along_turn(subject: &Subject<'_>, joint: usize, causes: &[&Cause]) -> Opt
         })
     };
     let orders = harmonics().map(|harmonic| Some(harmonic?.1)).collect::<Option<Vec<f64>>>()?;
-    let length = (TAU / orders.into_iter().min_by(f64::total_cmp)?).max(SHORTEST_RAD);
+    let length = (TAU / orders.into_iter().min_by(f64::total_cmp)?).max(MIN_STRETCH_RAD);
     let (nominal, still) = (subject.nominal, Condition::default());
     let statics = nominal.statics();
     let error = |row: &Row| {

@@ -22,7 +22,7 @@ use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 use truegrind_arm::model::Model;
 
 /// Most rows on either side of a change point to which it may move.
-const FARTHEST: usize = 64;
+const MAX_MOVED_ROWS: usize = 64;
 
 /// The expected growth of each row's squared error (mm²) because the change points of shifts are uncertain; empty without shifts. For a
 /// single row it may be negative.
@@ -37,8 +37,8 @@ pub fn added_squares(observed: &Observations, model: &Model, frames: &Frames) ->
     let doubled_variance = 2.0 * variance_of_independent(&errors);
     let mut added = vec![0.0; n];
     for (k, &change) in changes.iter().enumerate() {
-        let first = change.saturating_sub(FARTHEST).max(if k > 0 { changes[k - 1] } else { 0 });
-        let end = (change + FARTHEST).min(changes.get(k + 1).copied().unwrap_or(n));
+        let first = change.saturating_sub(MAX_MOVED_ROWS).max(if k > 0 { changes[k - 1] } else { 0 });
+        let end = (change + MAX_MOVED_ROWS).min(changes.get(k + 1).copied().unwrap_or(n));
         let near: Vec<usize> = (first..end).collect();
         let rows = observed.subset(&near);
         let sides = [end, first].map(|to| {

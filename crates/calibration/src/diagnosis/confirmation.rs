@@ -64,19 +64,22 @@ const ALLOWED_FAILURES: usize = 1;
 
 /// Fewest of the six halves that must be able to detect a cause: one half that finds it is no recurrence. With all but one of six asked, 4 of
 /// 50 true effects between λ 40 and 80 would lose their name, and no false one.
-const LEAST_TESTABLE: usize = 4;
+const MIN_TESTABLE_HALVES: usize = 4;
 
 /// Squared correlation of a joint's approach side with its last step from which the two are confounded.
 const CONFOUNDED: f64 = 0.9;
 
 /// Twice the log Bayes factor against its best rival that an identified cause needs, with and without the discrepancy in the model:
 /// 20 to 1.
-pub(super) const CLEAR: f64 = 6.0;
+pub(super) const CLEAR_TWICE_LOG_BF: f64 = 6.0;
 
 impl Confirmation {
     /// Whether it passes all criteria for an identified cause.
     pub(super) fn is_confirmed(&self) -> bool {
-        self.is_significant() && self.margin >= CLEAR && self.is_stable() && self.changed <= ALLOWED_FAILURES
+        self.is_significant()
+            && self.margin >= CLEAR_TWICE_LOG_BF
+            && self.is_stable()
+            && self.changed <= ALLOWED_FAILURES
     }
 
     /// Whether it is significant and plausible, confirmed or not.
@@ -86,7 +89,7 @@ impl Confirmation {
 
     /// Whether it was recovered in the halves that could detect it; not if these are few.
     fn is_stable(&self) -> bool {
-        self.testable >= LEAST_TESTABLE && self.recovered + ALLOWED_FAILURES >= self.testable
+        self.testable >= MIN_TESTABLE_HALVES && self.recovered + ALLOWED_FAILURES >= self.testable
     }
 
     /// Why it is not confirmed.
@@ -105,13 +108,13 @@ impl Confirmation {
             out.push(
                 "not significant once smooth unmodelled trends in time and pose are allowed for".to_owned(),
             );
-        } else if self.margin < CLEAR {
+        } else if self.margin < CLEAR_TWICE_LOG_BF {
             out.push(format!(
                 "with smooth unmodelled trends allowed for, a rival is nearly as probable: twice the log Bayes factor {:.1}",
                 self.margin
             ));
         }
-        if self.testable < LEAST_TESTABLE {
+        if self.testable < MIN_TESTABLE_HALVES {
             out.push(format!(
                 "too weak to be detected in {} of {HALVES} halves of the rows, so repeating the search cannot confirm it",
                 HALVES - self.testable
@@ -136,13 +139,13 @@ const OVERLAP: f64 = 0.8;
 const CHANGED: f64 = 0.5;
 
 /// Fall of χ² in all rows, relative to geometry alone, that a candidate needs to take part in stability selection.
-const LEAST_GAIN: f64 = 15.0;
+const MIN_GAIN: f64 = 15.0;
 
 /// Non-centrality from which a half can detect a cause.
 const DETECTABLE: f64 = 15.0;
 
 /// Confirmations of all accepted causes.
-pub(super) struct Outcome {
+pub(super) struct Confirmations {
     /// One for each cause.
     pub confirmations: Vec<Confirmation>,
     /// The discrepancy given the significant causes.
@@ -182,7 +185,7 @@ struct WithColumns {
 
 impl ConfirmationContext<'_> {
     /// Tests all causes.
-    pub(super) fn outcome(&self) -> Outcome {
+    pub(super) fn outcome(&self) -> Confirmations {
         let numbers: Vec<usize> = self.subject.observed.dataset.rows.iter().map(|r| r.number).collect();
         let functions = Functions::of(self.subject, self.linear);
         let own: Vec<WithColumns> = self
@@ -232,7 +235,7 @@ impl ConfirmationContext<'_> {
                 }
             }
         }
-        Outcome { confirmations, discrepancy: eliminated.discrepancy }
+        Confirmations { confirmations, discrepancy: eliminated.discrepancy }
     }
 
     /// Candidates for stability selection: those with enough gain relative to geometry alone. `whole` is the design of the fit beside
@@ -255,7 +258,7 @@ impl ConfirmationContext<'_> {
             .zip(projected)
             .filter(|(t, p)| {
                 let candidate = &t.candidate;
-                score_projected(p, &candidate.cause.sizes(), candidate.tried).gain > LEAST_GAIN
+                score_projected(p, &candidate.cause.sizes(), candidate.tried).gain > MIN_GAIN
             })
             .map(|(t, _)| t)
             .collect()

@@ -2,7 +2,7 @@
 //! nothing was measured.
 
 use super::cause_kind::CauseKind;
-use super::extension::{Extended, Freedom, Subject, fit};
+use super::extension::{Extended, FreeParameters, Subject, fit};
 use super::finding::{Confidence, Finding, FoundParameter, Gain, NoiseFloorSource};
 use super::preparation::Prepared;
 use super::selection::BLOCKS;
@@ -36,7 +36,7 @@ pub(super) fn rounding_finding(
     let coordinates = dataset.sensor.axes() as f64;
     let share = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
     let raw = Subject { observed: logged, ..*subject };
-    let unsharpened = fit(&raw, &[], Freedom::All, Some(geometric));
+    let unsharpened = fit(&raw, &[], FreeParameters::All, Some(geometric));
     let before = Validation::of(&raw, &[], 0, BLOCKS).random_rmse(&unsharpened);
     let left = before.min(errors.with_causes.random.rmse);
     if share < ROUNDING_SHARE * left * left {

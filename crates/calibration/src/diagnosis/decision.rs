@@ -16,7 +16,7 @@ use crate::measurement::dataset::Sensor;
 pub const DIAGNOSIS_FILE: &str = "DIAGNOSIS.json";
 
 /// Share below which a rival is beaten and not listed.
-const LEAST_SHARE: f64 = 0.01;
+const MIN_SHARE: f64 = 0.01;
 
 /// Effects that poses, repeats, both sides of approach or visits over time decide: those that `plan` has questions for.
 pub const DECIDED_BY_POSES: [CauseKind; 10] = [
@@ -72,7 +72,8 @@ pub fn members(finding: &Finding) -> Vec<Member> {
         share: 0.0,
     }];
     let mut logs = vec![0.0];
-    let least = finding.alternatives.iter().map(|rival| rival.beaten_by).fold(f64::INFINITY, f64::min);
+    let least =
+        finding.alternatives.iter().map(|rival| rival.twice_log_bayes_factor).fold(f64::INFINITY, f64::min);
     let nearer = finding.margin.map_or(0.0, |margin| (least - margin).max(0.0));
     for rival in &finding.alternatives {
         let same = |m: &Member| {
@@ -80,7 +81,7 @@ pub fn members(finding: &Finding) -> Vec<Member> {
                 == (&rival.effect, &rival.joints, rival.rows, rival.family)
         };
         // The same name twice is one member in two variants: the better one counts.
-        let log = -0.5 * (rival.beaten_by - nearer);
+        let log = -0.5 * (rival.twice_log_bayes_factor - nearer);
         if let Some(place) = out.iter().position(same) {
             logs[place] = f64::max(logs[place], log);
             continue;
@@ -99,7 +100,7 @@ pub fn members(finding: &Finding) -> Vec<Member> {
     out.iter_mut().zip(&logs).for_each(|(member, log)| member.share = (log - most).exp() / total);
     let named = (out[0].effect, out[0].joints.clone(), out[0].family);
     let is_named = |m: &Member| (&m.effect, &m.joints, m.family) == (&named.0, &named.1, named.2);
-    out.retain(|member| member.share >= LEAST_SHARE || is_named(member));
+    out.retain(|member| member.share >= MIN_SHARE || is_named(member));
     out.sort_by(|a, b| b.share.total_cmp(&a.share));
     let kept: f64 = out.iter().map(|member| member.share).sum();
     out.iter_mut().for_each(|member| member.share /= kept);

@@ -516,7 +516,7 @@ impl Design {
     /// The columns with everything free projected off, n × k.
     pub fn pure(&self, columns: &DMatrix<f64>, projected: &Projected) -> DMatrix<f64> {
         let shared = self.shared(projected);
-        if columns.ncols() >= MANY {
+        if columns.ncols() >= MANY_COLUMNS {
             return columns - product_of_transposed(&self.basis, &shared);
         }
         let mut out = columns.clone();
@@ -579,7 +579,7 @@ pub(super) fn side_by_side<'a>(
 }
 
 /// Number of columns from which a matrix product is worth packing the basis.
-const MANY: usize = 8;
+const MANY_COLUMNS: usize = 8;
 
 /// Whitened residuals of a problem at `x` and its Jacobian transposed, p × n; what is no number counts as 0.
 pub(super) fn linearised(problem: &CalibrationProblem, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {

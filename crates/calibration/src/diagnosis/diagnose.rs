@@ -8,9 +8,9 @@ use super::data_quality::single_angles;
 use super::decision;
 use super::extension::{Extended, Subject};
 use super::finding::{
-    Confidence, DiagnoseError, Diagnosis, Finding, Fits, RangeNoise, SCHEMA, Source, Stage,
+    Confidence, DiagnoseError, DiagnosedRows, Diagnosis, Finding, Fits, RangeNoise, SCHEMA, Stage,
 };
-use super::handover::{HandedOver, Handover, too_many_aside};
+use super::handover::{Handover, WrittenModel, too_many_aside};
 use super::merged;
 pub use super::options::Options;
 use super::picture::Picture;
@@ -128,7 +128,7 @@ pub fn diagnose(
         few_poses,
         identified: OnceCell::new(),
     };
-    let HandedOver { estimated, benefit } = handover.arm(&certain, &mut diagnosis.notes);
+    let WrittenModel { estimated, benefit } = handover.arm(&certain, &mut diagnosis.notes);
     diagnosis.verdict = Some(estimated.verdict.clone());
     for (k, finding) in diagnosis.findings.iter_mut().enumerate() {
         let own = (0..finding_of_cause.len()).filter(|&cause| finding_of_cause[cause] == k);
@@ -281,7 +281,7 @@ fn build_diagnosis(
     let diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
         verdict: None,
-        dataset: Source {
+        dataset: DiagnosedRows {
             file: dataset.file.clone(),
             rows: dataset.rows.len(),
             sensor: dataset.sensor,

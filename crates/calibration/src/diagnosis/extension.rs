@@ -44,7 +44,7 @@ pub struct Subject<'a> {
 
 /// The free parameters of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Freedom {
+pub enum FreeParameters {
     /// Frames alone.
     Frames,
     /// Frames, links, and the causes.
@@ -96,7 +96,7 @@ fn robust_weight_of(size: f64) -> f64 {
 
 /// Smallest standard deviation of a reading (mm, rad). With fewer rows than parameters the residual is 0; unbounded weights would then
 /// overwhelm the priors.
-const LEAST_SIGMA: (f64, f64) = (1e-3, 1e-6);
+const MIN_SIGMA: (f64, f64) = (1e-3, 1e-6);
 
 /// Convergence tolerance of fits within a search, in χ²/2 for each scalar row: the linearisation absorbs the rest, and merits are
 /// compared in units of χ².
@@ -131,11 +131,11 @@ fn reached(subject: &Subject<'_>, effect: &Effect) -> Vec<bool> {
 fn start(
     subject: &Subject<'_>,
     causes: &[Cause],
-    freedom: Freedom,
+    free_parameters: FreeParameters,
     seen: bool,
 ) -> (Model, Frames, Vec<(Parameter, Option<f64>)>) {
     let (mut model, mut frames) = (subject.nominal.clone(), subject.frames.clone());
-    let links = if freedom == Freedom::All { link_parameters(&model) } else { Vec::new() };
+    let links = if free_parameters == FreeParameters::All { link_parameters(&model) } else { Vec::new() };
     let mut links: Vec<_> = links.into_iter().map(|p| (p, None)).collect();
     let mut sensing: Vec<_> =
         frame_parameters(&subject.observed.dataset).into_iter().map(|p| (p, None)).collect();
@@ -200,20 +200,25 @@ fn median_size(k: usize) -> f64 {
 
 /// Robust fit of the nominal arm extended by `causes`, starting at their values. `near` provides starting values of links, frames
 /// and noise.
-pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Option<&Extended>) -> Extended {
-    warm_fit(subject, causes, freedom, near).refine()
+pub fn fit(
+    subject: &Subject<'_>,
+    causes: &[Cause],
+    free_parameters: FreeParameters,
+    near: Option<&Extended>,
+) -> Extended {
+    warm_fit(subject, causes, free_parameters, near).refine()
 }
 
 /// The same within a search: only to the tolerance of Gauss–Newton from `near`, without a covariance.
 pub(super) fn warm_fit(
     subject: &Subject<'_>,
     causes: &[Cause],
-    freedom: Freedom,
+    free_parameters: FreeParameters,
     near: Option<&Extended>,
 ) -> Extended {
     let observed = subject.observed;
     let dataset = &observed.dataset;
-    let (start_model, start_frames, free) = start(subject, causes, freedom, true);
+    let (start_model, start_frames, free) = start(subject, causes, free_parameters, true);
     let mut x: Vec<f64> = free.iter().map(|p| starting(p, near)).collect();
     let parameters: Vec<Parameter> = free.into_iter().map(|p| p.0).collect();
     let priors = subject.tolerance.priors_within(&parameters, &start_model, &start_frames);
@@ -229,7 +234,7 @@ pub(super) fn warm_fit(
     let plain_task =
         CalibrationProblem::new(dataset, &start_model, &start_frames, &parameters, &priors, &unweighted);
     let (mut model, mut frames) = plain_task.apply(&x);
-    let mut nearby = near.is_some() && freedom == Freedom::All;
+    let mut nearby = near.is_some() && free_parameters == FreeParameters::All;
     loop {
         round += 1;
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);
@@ -255,8 +260,8 @@ pub(super) fn warm_fit(
                 .iter()
                 .zip(by_length.iter().zip(&by_angle))
                 .map(|(w, (length, angle))| Weight {
-                    per_mm: (w.per_mm / length).min(LEAST_SIGMA.0.recip()),
-                    per_rad: (w.per_rad / angle).min(LEAST_SIGMA.1.recip()),
+                    per_mm: (w.per_mm / length).min(MIN_SIGMA.0.recip()),
+                    per_rad: (w.per_rad / angle).min(MIN_SIGMA.1.recip()),
                 })
                 .collect();
             let problem = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
@@ -435,7 +440,7 @@ fn updated_sigma(sigma: f64, spread: f64, base: &[Weight], lengths: bool) -> f64
     let of = |w: &Weight| if lengths { w.per_mm } else { w.per_rad };
     let total = median(&base.iter().map(|w| 1.0 / of(w).powi(2)).collect::<Vec<_>>()).unwrap_or(1.0);
     let share = (total - sigma * sigma).max(0.0);
-    let smallest = if lengths { LEAST_SIGMA.0 } else { LEAST_SIGMA.1 };
+    let smallest = if lengths { MIN_SIGMA.0 } else { MIN_SIGMA.1 };
     (total * spread * spread - share).max(0.01 * sigma * sigma).sqrt().max(smallest)
 }
 
@@ -489,7 +494,7 @@ impl Extended {
 
     /// The same fit with all parameters of its causes; those that no row reaches have their prior mean and variance.
     pub(super) fn whole(self, subject: &Subject<'_>) -> Self {
-        let (model, frames, free) = start(subject, &self.causes, Freedom::All, false);
+        let (model, frames, free) = start(subject, &self.causes, FreeParameters::All, false);
         let parameters: Vec<Parameter> = free.into_iter().map(|p| p.0).collect();
         if parameters.len() == self.parameters.len() {
             return self;

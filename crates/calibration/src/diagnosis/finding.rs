@@ -16,7 +16,7 @@ pub const SCHEMA: &str = "truegrind.diagnosis/1";
 
 /// The rows that were diagnosed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Source {
+pub struct DiagnosedRows {
     /// File.
     pub file: String,
     /// Rows.
@@ -147,7 +147,8 @@ pub struct Alternative {
     /// Held-out error with it in the finding's place (mm).
     pub cv_rmse_mm: f64,
     /// Twice the log Bayes factor of the finding against it.
-    pub beaten_by: f64,
+    #[serde(rename = "beaten_by")]
+    pub twice_log_bayes_factor: f64,
 }
 
 /// Rows in which the set-up was displaced.
@@ -289,7 +290,7 @@ pub struct Diagnosis {
     /// [`SCHEMA`].
     pub schema: String,
     /// The rows.
-    pub dataset: Source,
+    pub dataset: DiagnosedRows,
     /// The verdict on the extended model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
@@ -447,7 +448,7 @@ impl TryFrom<String> for NoiseFloorSource {
 }
 
 /// Multiple of the noise floor from which an error is not taken for noise.
-const NOT_NOISE: f64 = 3.0;
+const NOISE_FLOORS_OF_AN_ERROR: f64 = 3.0;
 
 /// Where only rounding is known, the error (mm) that is still taken for noise of the sensor: several times that of a laser tracker or a
 /// camera.
@@ -455,5 +456,5 @@ const NOISE_OF_A_SENSOR_MM: f64 = 0.15;
 
 /// Whether an error is too large for noise of sensor and arm; `measured`: by repeated poses.
 pub(super) fn too_much_for_noise(error_mm: f64, floor_mm: f64, measured: bool) -> bool {
-    error_mm > NOT_NOISE * floor_mm && (measured || error_mm > NOISE_OF_A_SENSOR_MM)
+    error_mm > NOISE_FLOORS_OF_AN_ERROR * floor_mm && (measured || error_mm > NOISE_OF_A_SENSOR_MM)
 }

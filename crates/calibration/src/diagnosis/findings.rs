@@ -8,7 +8,7 @@ use super::candidates::Scored;
 use super::catalogue::{Candidate, LoggedColumns};
 use super::cause::{Cause, MAP_KNOTS};
 use super::cause_kind::CauseKind;
-use super::confirmation::CLEAR;
+use super::confirmation::CLEAR_TWICE_LOG_BF;
 use super::decision;
 use super::design::{Design, FullDesign};
 use super::drift;
@@ -61,7 +61,7 @@ struct Beside<'a> {
 }
 
 /// Whether a cause is told apart from every alternative.
-struct Verdict {
+struct CauseVerdict {
     clear: bool,
     alternatives: Vec<Alternative>,
     doubts: Vec<String>,
@@ -187,24 +187,24 @@ impl FindingBuilder<'_> {
                 rows: rival.candidate.cause.rows(),
                 family: decision::family_of(&rival.candidate.cause),
                 cv_rmse_mm: held.rmse_mm(Some((&columns, &sizes)), self.set_aside),
-                beaten_by: own.own.merit - rival.score.merit,
+                twice_log_bayes_factor: own.own.merit - rival.score.merit,
             }
         };
         own.rivals.iter().take(3).map(alternative).collect()
     }
 
     /// Compares a cause with its alternatives.
-    fn verdict(&self, cause: &Cause, own: &Accepted, beside: &Beside<'_>) -> Verdict {
+    fn verdict(&self, cause: &Cause, own: &Accepted, beside: &Beside<'_>) -> CauseVerdict {
         let Beside { without, held, before_mm, after_mm } = *beside;
         let mut alternatives = self.rivals(own, without, held);
         let mut clear = alternatives.iter().all(|rival| is_beaten(rival, after_mm));
-        let plain = |effect, family, cv_rmse_mm, beaten_by| Alternative {
+        let plain = |effect, family, cv_rmse_mm, twice_log_bayes_factor| Alternative {
             effect,
             joints: None,
             rows: None,
             family,
             cv_rmse_mm,
-            beaten_by,
+            twice_log_bayes_factor,
         };
         // A finding that raises the held-out error is not confirmed, however well it fits the other rows.
         let unconfirmed = before_mm < BETTER * after_mm;
@@ -231,13 +231,15 @@ impl FindingBuilder<'_> {
         {
             let columns = map.columns(without);
             let cv_rmse_mm = held.rmse_mm(Some((&columns, &map.cause.sizes())), self.set_aside);
-            let beaten_by = own.own.merit - score(without, &map).merit;
+            let twice_log_bayes_factor = own.own.merit - score(without, &map).merit;
             let family = decision::family_of(&map.cause);
             let joints = pendant(&map.cause.joints());
-            alternatives
-                .push(Alternative { joints, ..plain(map.cause.kind(), family, cv_rmse_mm, beaten_by) });
+            alternatives.push(Alternative {
+                joints,
+                ..plain(map.cause.kind(), family, cv_rmse_mm, twice_log_bayes_factor)
+            });
         }
-        Verdict { clear, alternatives, doubts }
+        CauseVerdict { clear, alternatives, doubts }
     }
 
     fn finding(&self, index: usize, own: &Accepted, after_mm: f64) -> (Finding, Picture) {
@@ -248,7 +250,7 @@ impl FindingBuilder<'_> {
         let held = self.held.without(&places);
         let before_mm = held.rmse_mm(None, self.set_aside);
         let beside = Beside { without: &without, held: &held, before_mm, after_mm };
-        let Verdict { clear, alternatives, doubts } = self.verdict(cause, own, &beside);
+        let CauseVerdict { clear, alternatives, doubts } = self.verdict(cause, own, &beside);
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
         let picture = picture(self.subject, cause, &without, &self.whole.design);
@@ -306,7 +308,7 @@ fn same_readings(cause: &Cause) -> Option<CauseKind> {
 
 /// Whether a finding clearly beats a rival; `after_mm` is the held-out error with the finding.
 fn is_beaten(rival: &Alternative, after_mm: f64) -> bool {
-    rival.beaten_by >= CLEAR && !(rival.cv_rmse_mm < BETTER * after_mm)
+    rival.twice_log_bayes_factor >= CLEAR_TWICE_LOG_BF && !(rival.cv_rmse_mm < BETTER * after_mm)
 }
 
 /// Whether a spring of the arm is certain and only its place is not: every rival that might be true is another spring, a link or a joint.

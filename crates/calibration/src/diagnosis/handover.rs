@@ -61,7 +61,7 @@ pub(super) struct Handover<'a> {
 }
 
 /// The arm for compensation.
-pub(super) struct HandedOver {
+pub(super) struct WrittenModel {
     pub(super) estimated: Estimated,
     /// Absent where it cannot be stated.
     pub(super) benefit: Option<Benefit>,
@@ -90,7 +90,7 @@ struct WrittenArm<'a> {
 
 impl Handover<'_> {
     /// The arm with the causes that are `certain`, or with fewer of them, as the notes say.
-    pub(super) fn arm(&self, certain: &[bool], notes: &mut Vec<String>) -> HandedOver {
+    pub(super) fn arm(&self, certain: &[bool], notes: &mut Vec<String>) -> WrittenModel {
         let (search, discrepancy) = (self.search, self.discrepancy);
         let certain = certain_model(search, certain, discrepancy);
         let beside_sensor = certain.errors;
@@ -101,7 +101,7 @@ impl Handover<'_> {
                 "the written arm was fitted without the causes in the measurement, which might make its links worse (probability \
                  {:.0} %, at most {:.0} % are allowed)",
                 100.0 * probability,
-                100.0 * sensor_causes::MOST_PROBABILITY
+                100.0 * sensor_causes::MAX_PROBABILITY
             )
         }));
         let with_sensor = left_out.as_ref().map(|left_out| &left_out.fit);
@@ -122,11 +122,11 @@ impl Handover<'_> {
     /// a common growth is met by a link of another length whose constant part the frames take up.
     fn or_geometry_alone(
         &self,
-        with_causes: HandedOver,
+        with_causes: WrittenModel,
         beside_sensor: StageError,
         with_sensor: Option<&Extended>,
         notes: &mut Vec<String>,
-    ) -> HandedOver {
+    ) -> WrittenModel {
         let verdict = &with_causes.estimated.verdict;
         if verdict.status != Judgement::Fail || self.search.full_fit.causes.is_empty() {
             return with_causes;
@@ -177,7 +177,7 @@ impl Handover<'_> {
 
     /// The arm for compensation and its expected benefit. What it lacks stands in its covariance. Of too few poses no benefit is stated:
     /// it would be the priors'.
-    fn estimated(&self, arm: &WrittenArm<'_>) -> HandedOver {
+    fn estimated(&self, arm: &WrittenArm<'_>) -> WrittenModel {
         let SearchContext { subject, options, .. } = self.search.context;
         let (nominal, rows) = (subject.nominal, &subject.observed.dataset);
         let [fitted, mut handed] = [arm.fitted, arm.with_uncertain].map(|fit| self.widened(fit));
@@ -215,7 +215,7 @@ impl Handover<'_> {
             set_aside: (self.search.set_aside.len(), rows.rows.len()),
             options,
         });
-        HandedOver { estimated, benefit: benefit.ok() }
+        WrittenModel { estimated, benefit: benefit.ok() }
     }
 
     /// The rows that were not set aside.
@@ -401,9 +401,14 @@ fn without_measurement_causes(
     let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
     let beside = in_doubt::with_zero_causes(&without, certain.fit.clone());
     match probability_worse(&certain.fit, &beside, &median_condition(dataset), &samples) {
+<<<<<<< HEAD
         Some(probability) if probability > sensor_causes::MOST_PROBABILITY => {
             let written = WrittenFit { errors: search.validation.stage(&without), fit: without };
             (written, Some(LeftOut { fit: certain.fit, probability }))
+=======
+        Some(probability) if probability > sensor_causes::MAX_PROBABILITY => {
+            (WrittenFit { errors: search.validation.stage(&without), fit: without }, Some(probability))
+>>>>>>> repW
         }
         _ => (certain, None),
     }

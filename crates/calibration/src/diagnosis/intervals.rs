@@ -40,7 +40,7 @@ impl Interval {
 }
 
 /// Shortest interval: fewer rows are outliers, not a shift.
-pub const SHORTEST: usize = 4;
+pub const MIN_INTERVAL_ROWS: usize = 4;
 
 /// Effective number of distinct intervals among n rows, for the multiple-testing correction.
 pub fn tried(n: f64) -> f64 {
@@ -57,7 +57,7 @@ const REFINED_EVIDENCE: f64 = 5.0;
 const TIE_EVIDENCE: f64 = 6.0;
 
 /// Most parameters of a shift.
-const MOST: usize = 6;
+const MAX_SHIFT_PARAMETERS: usize = 6;
 
 /// Dot product in eight partial sums, for vectorisation.
 fn dot(x: &[f64], y: &[f64]) -> f64 {
@@ -163,27 +163,27 @@ fn evidence<R: Real>(
         let (g, s) = (gradient(0), square(0, 0).each(|s| s.max(0.0)));
         return [g * g / (s + one) - (one + s).each(f64::ln), one];
     }
-    let (mut l, mut y) = ([zero; MOST * MOST], [zero; MOST]);
+    let (mut l, mut y) = ([zero; MAX_SHIFT_PARAMETERS * MAX_SHIFT_PARAMETERS], [zero; MAX_SHIFT_PARAMETERS]);
     let (mut det, mut definite, mut gain) = (one, one, zero);
     for a in 0..k {
         for b in 0..=a {
             let mut sum = if a == b { square(a, b) + one } else { square(a, b) };
             for c in 0..b {
-                sum -= l[a * MOST + c] * l[b * MOST + c];
+                sum -= l[a * MAX_SHIFT_PARAMETERS + c] * l[b * MAX_SHIFT_PARAMETERS + c];
             }
             if a == b {
                 definite = definite * sum.positive();
                 det = det * sum;
-                l[a * MOST + a] = sum.sqrt();
+                l[a * MAX_SHIFT_PARAMETERS + a] = sum.sqrt();
             } else {
-                l[a * MOST + b] = sum / l[b * MOST + b];
+                l[a * MAX_SHIFT_PARAMETERS + b] = sum / l[b * MAX_SHIFT_PARAMETERS + b];
             }
         }
         let mut sum = gradient(a);
         for c in 0..a {
-            sum -= l[a * MOST + c] * y[c];
+            sum -= l[a * MAX_SHIFT_PARAMETERS + c] * y[c];
         }
-        y[a] = sum / l[a * MOST + a];
+        y[a] = sum / l[a * MAX_SHIFT_PARAMETERS + a];
         gain += y[a] * y[a];
     }
     [gain - det.each(f64::ln), definite]
@@ -230,7 +230,7 @@ impl ShiftScan {
     /// parameters.
     pub fn of(whole: &Design, columns: &DMatrix<f64>, sizes: &[f64]) -> Option<Self> {
         let (n, per, k) = (whole.observations, whole.per, columns.ncols());
-        if n < 3 * SHORTEST || k > MOST {
+        if n < 3 * MIN_INTERVAL_ROWS || k > MAX_SHIFT_PARAMETERS {
             return None;
         }
         let mut scaled = columns.clone();
@@ -247,7 +247,7 @@ impl ShiftScan {
             }
         }
         let stride = n.div_ceil(GRID).max(1);
-        let cuts: Vec<usize> = (SHORTEST..n - 1).step_by(stride).chain([n]).collect();
+        let cuts: Vec<usize> = (MIN_INTERVAL_ROWS..n - 1).step_by(stride).chain([n]).collect();
         let shared = sums_at(&cuts, &scaled, &whole.basis, per);
         let products = gram(&shared);
         let square_at_cuts = by_entry(k, cuts.len(), |cut, a, b| square[(cuts[cut] * k + a) * k + b]);
@@ -283,7 +283,7 @@ impl ShiftScan {
                 let mut found = Vec::new();
                 for (evidence, cut) in sums.after_cut(first).into_iter().zip(&self.cuts[first + 1..]) {
                     let to = cut - 1;
-                    if to + 1 >= from + SHORTEST && is_valid_end(to, n) {
+                    if to + 1 >= from + MIN_INTERVAL_ROWS && is_valid_end(to, n) {
                         found.push(Interval { from, to, evidence });
                     }
                 }
@@ -417,7 +417,7 @@ pub fn scan(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], count: usize
 
 /// A shift ends with the last row, or early enough before it to be distinguishable from one that does.
 fn is_valid_end(to: usize, n: usize) -> bool {
-    to == n - 1 || to + SHORTEST < n
+    to == n - 1 || to + MIN_INTERVAL_ROWS < n
 }
 
 /// Shared rows over all rows of two intervals.
@@ -434,8 +434,10 @@ fn refined(sums: &ScanSums<'_>, mut best: Interval) -> Interval {
     for _ in 0..6 {
         let before = best;
         let high = sums.at_row(best.to + 1, &mut known).to_vec();
-        for from in best.from.saturating_sub(2 * stride).max(SHORTEST)..=(best.from + 2 * stride).min(n - 2) {
-            if from + SHORTEST <= best.to + 1 {
+        for from in
+            best.from.saturating_sub(2 * stride).max(MIN_INTERVAL_ROWS)..=(best.from + 2 * stride).min(n - 2)
+        {
+            if from + MIN_INTERVAL_ROWS <= best.to + 1 {
                 let low = sums.at_row(from, &mut known);
                 let evidence = sums.evidence(from, best.to, low, &high, &mut work);
                 if evidence > best.evidence {
@@ -445,7 +447,7 @@ fn refined(sums: &ScanSums<'_>, mut best: Interval) -> Interval {
         }
         let low = sums.at_row(best.from, &mut known).to_vec();
         for to in best.to.saturating_sub(2 * stride)..=(best.to + 2 * stride).min(n - 1) {
-            if best.from + SHORTEST <= to + 1 && is_valid_end(to, n) {
+            if best.from + MIN_INTERVAL_ROWS <= to + 1 && is_valid_end(to, n) {
                 let high = sums.at_row(to + 1, &mut known);
                 let evidence = sums.evidence(best.from, to, &low, high, &mut work);
                 if evidence > best.evidence {
@@ -474,7 +476,8 @@ fn refined(sums: &ScanSums<'_>, mut best: Interval) -> Interval {
 /// An interval that starts with nearly the first rows of a station has its complement in the station in which it ends; one that ends with
 /// a later station starts in the middle of its first.
 fn equivalents(stations: &[Range<usize>], best: Interval) -> Vec<Range<usize>> {
-    let starts = |range: &Range<usize>| (range.start..=range.start + 3 * SHORTEST).contains(&best.from);
+    let starts =
+        |range: &Range<usize>| (range.start..=range.start + 3 * MIN_INTERVAL_ROWS).contains(&best.from);
     let of = |row: usize| stations.iter().find(|range| range.contains(&row)).cloned();
     let Some(last) = of(best.to) else { return Vec::new() };
     let all = last.end.max(stations.last().map_or(0, |range| range.end));
@@ -483,7 +486,7 @@ fn equivalents(stations: &[Range<usize>], best: Interval) -> Vec<Range<usize>> {
     if after < last.end && stations.iter().any(starts) {
         out.push(after..last.end);
     }
-    if after < all && best.from <= 3 * SHORTEST {
+    if after < all && best.from <= 3 * MIN_INTERVAL_ROWS {
         out.push(after..all);
     }
     if after == last.end
@@ -492,6 +495,6 @@ fn equivalents(stations: &[Range<usize>], best: Interval) -> Vec<Range<usize>> {
         out.push(best.from..first.end);
     }
     out.dedup();
-    out.retain(|range| range.len() >= SHORTEST || stations.len() == 1);
+    out.retain(|range| range.len() >= MIN_INTERVAL_ROWS || stations.len() == 1);
     out
 }

@@ -16,16 +16,16 @@
 use super::design::Linear;
 
 /// Least twice log likelihood ratio in each half of the rows.
-const LEAST_EVIDENCE: f64 = 15.0;
+const MIN_EVIDENCE: f64 = 15.0;
 
 /// Least ratio of the joint's evidence to that of the strongest rival without a joint.
-const CLEAR: f64 = 1.2;
+const MIN_EVIDENCE_RATIO: f64 = 1.2;
 
 /// How many times the rounding of the logged angles a scatter must be.
 const OF_ROUNDING: f64 = 1.5;
 
 /// Fewest scalar rows.
-const FEWEST: usize = 60;
+const MIN_SCALAR_ROWS: usize = 60;
 
 /// A joint about which the residual scatters.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +52,7 @@ impl JointScatter {
     ) -> Option<Self> {
         let (slopes, per) = (&linear.slopes, linear.per);
         // The one coordinate of a cable has no direction.
-        if per < 3 || linear.residual.len() < FEWEST {
+        if per < 3 || linear.residual.len() < MIN_SCALAR_ROWS {
             return None;
         }
         let weights: Vec<f64> = (0..linear.observations)
@@ -71,13 +71,13 @@ impl JointScatter {
             return None;
         }
         let halves = [0, 1].map(|half| rows.evidence(found.ratio, |row| row % 2 == half));
-        if !halves.iter().all(|evidence| *evidence > LEAST_EVIDENCE) {
+        if !halves.iter().all(|evidence| *evidence > MIN_EVIDENCE) {
             return None;
         }
         let frames = slopes.by_target.column_iter().chain(slopes.by_frame.column_iter());
         let rivals = frames.map(|column| along(column.as_slice())).chain([along(slopes.by_scale.as_slice())]);
         let strongest = rivals.map(|rows| rows.best().evidence).fold(0.0, f64::max);
-        if found.evidence < CLEAR * strongest {
+        if found.evidence < MIN_EVIDENCE_RATIO * strongest {
             return None;
         }
         let length = |row: usize| {

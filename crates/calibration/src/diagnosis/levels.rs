@@ -6,7 +6,7 @@
 
 use super::cause::Cause;
 use super::extension::Extended;
-use super::intervals::{SHORTEST, tried};
+use super::intervals::{MIN_INTERVAL_ROWS, tried};
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_estimation::problem::Problem;
@@ -82,7 +82,7 @@ fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
         })
         .collect();
     // Ends that nearly coincide are one event: a short piece is joined with the more similar neighbour.
-    while let Some(k) = pieces.iter().position(|(from, to, _)| to - from < SHORTEST) {
+    while let Some(k) = pieces.iter().position(|(from, to, _)| to - from < MIN_INTERVAL_ROWS) {
         let (from, to, level) = pieces.remove(k);
         let beside = |at: Option<usize>| at.and_then(|i| pieces.get(i)).map_or(&nothing, |p| &p.2);
         let (before, after) = (k.checked_sub(1), Some(k));

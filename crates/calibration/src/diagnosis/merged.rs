@@ -44,7 +44,7 @@ const MANY_SHIFTS: usize = 3;
 const SMALL_SHARE: f64 = 0.02;
 
 /// Number of findings with a cause above which small doubtful ones are merged.
-const MOST_REPORTED: usize = 9;
+const MAX_REPORTED: usize = 9;
 
 /// Contribution, as a share of that error, from which a doubtful finding is always reported separately.
 const DOUBTFUL_SHARE: f64 = 0.1;
@@ -123,7 +123,7 @@ pub(super) fn merge_findings(
     findings
 }
 
-/// Merges identified findings of one effect at several joints, the smallest effect first, while more than [`MOST_REPORTED`] findings
+/// Merges identified findings of one effect at several joints, the smallest effect first, while more than [`MAX_REPORTED`] findings
 /// are left. Effects that contribute `separate_mm` at any joint stay separate.
 fn merge_joints(findings: &mut Vec<MergedFinding>, contributions: &Contributions<'_>, separate_mm: f64) {
     let is_member = |s: &MergedFinding, effect: CauseKind| {
@@ -133,7 +133,7 @@ fn merge_joints(findings: &mut Vec<MergedFinding>, contributions: &Contributions
             && finding.rows.is_none()
             && finding.joints.as_ref().is_some_and(|joints| joints.len() == 1)
     };
-    while findings.len() > MOST_REPORTED {
+    while findings.len() > MAX_REPORTED {
         let largest = |effect: CauseKind| -> Option<f64> {
             let members: Vec<f64> = findings
                 .iter()
@@ -182,7 +182,7 @@ fn several_joints(members: &[MergedFinding], worth_mm: f64) -> Finding {
     merged
 }
 
-/// Causes of doubtful findings below `doubtful_mm`, smallest first, as many as exceed [`MOST_REPORTED`].
+/// Causes of doubtful findings below `doubtful_mm`, smallest first, as many as exceed [`MAX_REPORTED`].
 fn excess(
     findings: &[MergedFinding],
     small: impl Fn(&MergedFinding) -> bool,
@@ -190,7 +190,7 @@ fn excess(
 ) -> Vec<usize> {
     let worth = |s: &MergedFinding| s.finding.worth_mm.unwrap_or(f64::INFINITY);
     let reported: Vec<&MergedFinding> = findings.iter().filter(|s| !small(s)).collect();
-    if reported.len() <= MOST_REPORTED {
+    if reported.len() <= MAX_REPORTED {
         return Vec::new();
     }
     let doubted =
@@ -198,7 +198,7 @@ fn excess(
     let mut least: Vec<&&MergedFinding> = reported.iter().filter(doubted).collect();
     least.sort_by(|a, b| worth(a).total_cmp(&worth(b)));
     // The merged finding takes one line.
-    let beyond = reported.len() + 1 - MOST_REPORTED;
+    let beyond = reported.len() + 1 - MAX_REPORTED;
     least.into_iter().take(beyond).flat_map(|s| s.causes.iter().copied()).collect()
 }
 

@@ -30,10 +30,10 @@ pub(super) const CONVERGED: f64 = 1e-7;
 const STEPS: usize = 24;
 
 /// Smallest assumed ratio of predicted decreases from step to step: with nonzero residuals, Gauss–Newton converges linearly.
-const FASTEST: f64 = 0.05;
+const MIN_DECREASE_RATIO: f64 = 0.05;
 
 /// Largest assumed ratio.
-const SLOWEST: f64 = 0.95;
+const MAX_DECREASE_RATIO: f64 = 0.95;
 
 /// Relative increase of the cost that counts as rounding.
 const ROUNDING: f64 = 1e-10;
@@ -46,7 +46,7 @@ const LENGTHS: usize = 4;
 const SHORTER: (f64, f64) = (0.25, 0.5);
 
 /// From this number of parameters the products of columns take most of a pass, and N is kept for several steps.
-const MANY: usize = 100;
+const MANY_PARAMETERS: usize = 100;
 
 /// Ratio of predicted decreases up to which N is kept.
 const CONTRACTING: f64 = 0.2;
@@ -148,12 +148,16 @@ pub(super) fn descend_to(problem: &dyn Problem, x: &mut Vec<f64>, tolerance: f64
             return false;
         }
         // Ratio for the geometric series of all further predicted decreases.
-        let share = if length < 1.0 { SLOWEST } else { (predicted / last).clamp(FASTEST, SLOWEST) };
+        let share = if length < 1.0 {
+            MAX_DECREASE_RATIO
+        } else {
+            (predicted / last).clamp(MIN_DECREASE_RATIO, MAX_DECREASE_RATIO)
+        };
         if predicted < enough || share / (1.0 - share) * predicted < enough {
             return true;
         }
         last = predicted;
-        let kept = x.len() >= MANY && length == 1.0 && {
+        let kept = x.len() >= MANY_PARAMETERS && length == 1.0 && {
             here.follow(&mut objective, x);
             here.step().is_some_and(|(_, next)| next <= CONTRACTING * predicted)
         };

@@ -17,10 +17,10 @@ use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_math::lanes::{AnyWidth, SinCos, WIDTH, vectorised};
 
 /// The lowest order that is tried.
-const LOWEST: usize = 3;
+const MIN_ORDER: usize = 3;
 
 /// Orders up to this are tried: twice the ratio of a strain-wave reducer of 1:160 is 320.
-pub const HIGHEST: usize = 330;
+pub const MAX_ORDER: usize = 330;
 
 /// χ² of a peak from which a fine map is tried.
 const MAP_CHI_SQUARE: f64 = 25.0;
@@ -59,7 +59,7 @@ impl AngleHarmonics {
             (high - low > STILL_RAD).then(|| JointHarmonics {
                 once: both(1.0),
                 twice: both(2.0),
-                candidates: (LOWEST..=HIGHEST).map(|_| OnceLock::new()).collect(),
+                candidates: (MIN_ORDER..=MAX_ORDER).map(|_| OnceLock::new()).collect(),
             })
         }))
     }
@@ -79,7 +79,7 @@ fn strongest_orders(harmonics: &JointHarmonics, theta: &DVector<f64>, design: &D
     let of = |(order, [sine, cosine]): (usize, [f64; 2])| {
         (2.0 * (sine * sine + cosine * cosine) / weight.max(1e-300), order)
     };
-    let mut lines: Vec<(f64, usize)> = (LOWEST..=HIGHEST).zip(sums).map(of).collect();
+    let mut lines: Vec<(f64, usize)> = (MIN_ORDER..=MAX_ORDER).zip(sums).map(of).collect();
     lines.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     lines.truncate(KEPT);
     lines
@@ -105,7 +105,7 @@ impl AnyWidth for Orders<'_> {
             harmonics: JointHarmonics { once: [cosines, sines], twice: [cosines_twice, sines_twice], .. },
             pull,
         } = self;
-        let mut sums = vec![[[0.0; WIDTH]; 2]; HIGHEST + 1 - LOWEST];
+        let mut sums = vec![[[0.0; WIDTH]; 2]; MAX_ORDER + 1 - MIN_ORDER];
         let registers = ROWS / R::ROWS;
         for first in (0..pull.len()).step_by(ROWS) {
             // Sized for the narrowest registers; wider ones use fewer.
@@ -158,11 +158,11 @@ pub fn candidates(
     let candidates = strongest
         .into_par_iter()
         .filter_map(|(_, joint, order)| {
-            let known = turns.0[joint].as_ref()?.candidates.get(order - LOWEST)?;
+            let known = turns.0[joint].as_ref()?.candidates.get(order - MIN_ORDER)?;
             Some(Arc::clone(known.get_or_init(|| {
                 let harmonic = Harmonic { joint, order: order as f64, sine_rad: 0.0, cosine_rad: 0.0 };
                 Arc::new(Candidate {
-                    tried: (HIGHEST + 1 - LOWEST) as f64,
+                    tried: (MAX_ORDER + 1 - MIN_ORDER) as f64,
                     ..Candidate::arm(Effect::GearTransmission(harmonic), dataset, subject.nominal)
                 })
             })))

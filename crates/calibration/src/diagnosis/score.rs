@@ -168,14 +168,14 @@ pub(super) fn log_p_of_pure(
 
 /// Whether the empirical scatter counts: a few hundred rows do not determine that of many parameters.
 pub(super) fn is_scattered(sizes: &[f64], score: &Score) -> bool {
-    score.gain > SOME && sizes.len() <= MOST_SCATTERED
+    score.gain > SOME && sizes.len() <= MAX_SCATTERED
 }
 
 /// Fall of χ² below which the empirical scatter is not computed.
 const SOME: f64 = 8.0;
 
 /// Most parameters for which the gradient's covariance is estimated from the residuals.
-const MOST_SCATTERED: usize = 6;
+const MAX_SCATTERED: usize = 6;
 
 /// gᵀ S⁺ g over the directions that the data determine, and their number.
 fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64, usize) {

@@ -3,10 +3,10 @@
 
 use super::candidates::Scored;
 use super::cause::Cause;
-use super::confirmation::{ConfirmationContext, Outcome};
+use super::confirmation::{ConfirmationContext, Confirmations};
 use super::design::{FullDesign, Linear};
 use super::elimination::CORRELATED_NOISE;
-use super::extension::{Extended, Freedom, Subject, fit};
+use super::extension::{Extended, FreeParameters, Subject, fit};
 use super::findings::short_name;
 use super::options::Options;
 use super::preparation::Prepared;
@@ -72,7 +72,7 @@ pub(super) struct Search<'a> {
 pub(super) struct Confirmed {
     pub(super) linear: Linear,
     pub(super) whole: FullDesign,
-    pub(super) outcome: Outcome,
+    pub(super) outcome: Confirmations,
 }
 
 impl<'a> Search<'a> {
@@ -94,8 +94,8 @@ impl<'a> Search<'a> {
             ));
             let causes = extend_to_last_row(&searched_fit.causes, rows, dataset);
             (
-                fit(subject, &[], Freedom::All, Some(&geometric)),
-                fit(subject, &causes, Freedom::All, Some(&searched_fit)),
+                fit(subject, &[], FreeParameters::All, Some(&geometric)),
+                fit(subject, &causes, FreeParameters::All, Some(&searched_fit)),
             )
         } else {
             (geometric, searched_fit.clone())
@@ -298,7 +298,7 @@ const SHIFT_GAIN: f64 = 1.1;
 fn without(subject: &Subject<'_>, fitted: &Extended, dropped: &[usize]) -> Extended {
     let kept = fitted.causes.iter().enumerate().filter(|(k, _)| !dropped.contains(k));
     let causes: Vec<Cause> = kept.map(|(_, cause)| cause.clone()).collect();
-    fit(subject, &causes, Freedom::All, Some(fitted))
+    fit(subject, &causes, FreeParameters::All, Some(fitted))
 }
 
 /// The extended model with a smooth correction: a radial basis function network on the first three joints.
@@ -309,7 +309,7 @@ fn smooth_correction(subject: &Subject<'_>, extended: &Extended) -> Extended {
     let mut causes = extended.causes.clone();
     let spread = with_network(subject.nominal, &subject.observed.dataset, &options);
     causes.extend(spread.effects.last().cloned().map(Cause::Arm));
-    fit(subject, &causes, Freedom::All, Some(extended))
+    fit(subject, &causes, FreeParameters::All, Some(extended))
 }
 
 /// Extends intervals that end at the last searched row to the last row.

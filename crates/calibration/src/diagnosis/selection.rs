@@ -11,7 +11,7 @@ use super::candidates::{Catalogue, Scored};
 use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::design::Design;
-use super::extension::{Extended, Freedom, Subject, fit, warm_fit};
+use super::extension::{Extended, FreeParameters, Subject, fit, warm_fit};
 use super::held_out::FoldErrors;
 use super::levels;
 use super::score::{Score, score};
@@ -77,8 +77,8 @@ pub const BLOCKS: usize = 10;
 pub fn select(subject: &Subject<'_>, options: &Options, progress: &(dyn Fn(&str) + Sync)) -> Selection {
     let dataset = &subject.observed.dataset;
     let catalogue = Catalogue::of(subject);
-    let registered = fit(subject, &[], Freedom::Frames, None);
-    let geometric = fit(subject, &[], Freedom::All, Some(&registered));
+    let registered = fit(subject, &[], FreeParameters::Frames, None);
+    let geometric = fit(subject, &[], FreeParameters::All, Some(&registered));
     let random = split::folds(dataset, 5, options.seed);
     let blocks = split::blocks(dataset, BLOCKS);
     let mut current = Arc::new(geometric.clone());
@@ -108,7 +108,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, progress: &(dyn Fn(&str)
                 Review::Settled(accepted) => {
                     if !levels_tried && let Some(causes) = levels::piecewise_levels(&current.causes) {
                         levels_tried = true;
-                        let levelled = warm_fit(subject, &causes, Freedom::All, Some(&current));
+                        let levelled = warm_fit(subject, &causes, FreeParameters::All, Some(&current));
                         if levels::is_as_good(&levelled, &current) {
                             current = Arc::new(levelled);
                             continue;
@@ -130,7 +130,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, progress: &(dyn Fn(&str)
         let mut causes = current.causes.clone();
         causes.push(cause.clone());
         let count = current.causes.len();
-        let with = Arc::new(warm_fit(subject, &causes, Freedom::All, Some(&current)));
+        let with = Arc::new(warm_fit(subject, &causes, FreeParameters::All, Some(&current)));
         (current, known) = reviewed(&catalogue, subject, Arc::clone(&with), options, &to_review);
         // Two causes that push each other out would otherwise return in turn until the last step.
         ban_repeated_removals(&with, &current, &mut removed_once, &mut banned);
@@ -176,7 +176,7 @@ fn final_selection(
 ) -> Selection {
     let scores = CandidateScores::of(catalogue, subject, Arc::clone(&current));
     let left = scores.score_all(&scores.whole.design, true);
-    let accepted = (0..current.causes.len()).map(|index| judge(&scores, index, true).0).collect();
+    let accepted = (0..current.causes.len()).map(|index| score_without(&scores, index, true).0).collect();
     drop(scores);
     let families = catalogue.families;
     Selection { geometric, extended: Arc::unwrap_or_clone(current).refine(), accepted, left, families }
@@ -315,7 +315,9 @@ fn review(scores: &CandidateScores<'_>, options: &Options, which: &[usize], how:
     for some in which.chunks(PARALLEL_REVIEWS) {
         let looked: Vec<_> = some
             .par_iter()
-            .map(|&index| judge(scores, index, !how.listed_only || is_searched(&current.causes[index])))
+            .map(|&index| {
+                score_without(scores, index, !how.listed_only || is_searched(&current.causes[index]))
+            })
             .collect();
         for (&index, (judged, design, scored)) in some.iter().zip(looked) {
             let mut others = current.causes.clone();
@@ -332,10 +334,10 @@ fn review(scores: &CandidateScores<'_>, options: &Options, which: &[usize], how:
             let supported = !current.causes[index].requires_tilt() || Cause::tilt_is_supported(&others);
             let remains = supported && own > 0.0 && judged.log_p <= options.alpha.ln();
             if better.is_some() || !remains {
-                let reduced = warm_fit(subject, &others, Freedom::All, Some(current));
+                let reduced = warm_fit(subject, &others, FreeParameters::All, Some(current));
                 let Some(better) = better else { return Review::Changed(Box::new(reduced)) };
                 others.push(better.candidate.cause.clone());
-                let settled = warm_fit(subject, &others, Freedom::All, Some(&reduced));
+                let settled = warm_fit(subject, &others, FreeParameters::All, Some(&reduced));
                 return Review::Changed(Box::new(settled));
             }
             accepted.push(judged);
@@ -372,7 +374,7 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
 }
 
 /// Scores a cause against the model without it. Returns the result, the design of that model, and the scores of all candidates in it.
-fn judge(scores: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
+fn score_without(scores: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
     let current = &*scores.fit;
     let cause = &current.causes[index];
     let design = scores.whole.without(&current.parameter_indices(index));

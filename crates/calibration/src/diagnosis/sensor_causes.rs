@@ -16,7 +16,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_math::tail::normal_cdf;
 
 /// Largest probability of a worse arm up to which the written arm is fitted with the causes of the measurement.
-pub(super) const MOST_PROBABILITY: f64 = 0.02;
+pub(super) const MAX_PROBABILITY: f64 = 0.02;
 
 /// The probability that the arm of `without` is nearer in shape to the true one than that of `with`, which has the same parameters;
 /// `None` if it cannot be computed.

@@ -35,13 +35,13 @@ pub(super) fn lag_one_correlation(
 pub(super) const NEGLIGIBLE: f64 = 0.1;
 
 /// Largest lag that is tested, as a share of all rows.
-const MOST_LAG_SHARE: f64 = 0.04;
+const MAX_LAG_SHARE: f64 = 0.04;
 
 /// Range of the serial correlation in rows: the first lag at which it is below [`NEGLIGIBLE`] or insignificant.
 pub(super) fn correlation_range(left: &DVector<f64>, per: usize, poses: &[usize]) -> usize {
     let n = poses.len();
     let square = left.norm_squared() / left.len().max(1) as f64;
-    let most = (MOST_LAG_SHARE * n as f64) as usize;
+    let most = (MAX_LAG_SHARE * n as f64) as usize;
     let alike = |apart: usize| {
         let pairs = (0..n - apart).filter(|&i| poses[i] != poses[i + apart]);
         let scalars: Vec<usize> = pairs.flat_map(|i| i * per..(i + 1) * per).collect();

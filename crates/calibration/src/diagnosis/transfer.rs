@@ -8,7 +8,7 @@ use std::collections::HashSet;
 
 use super::cause::Cause;
 use super::diagnose::Diagnosed;
-use super::extension::{Freedom, Subject, fit};
+use super::extension::{FreeParameters, Subject, fit};
 use super::finding::Transfer;
 use super::preparation::prepare;
 use crate::identification::calibration::Frames;
@@ -67,7 +67,7 @@ fn errors_of(
     ];
     let errors = all.map(|(model, frames)| {
         let subject = Subject { observed: &prepared.observed, nominal: model, frames, tolerance };
-        let registered = fit(&subject, &[], Freedom::Frames, None);
+        let registered = fit(&subject, &[], FreeParameters::Frames, None);
         errors_on(&prepared.observed, &registered.model, &registered.frames)
     });
     (errors, prepared.observed)
@@ -205,7 +205,7 @@ impl Diagnosed {
             return Some(Foreign::BelowDataSheet);
         }
         let subject = Subject { observed, nominal: &estimated.model, frames, tolerance };
-        let another = fit(&subject, &[], Freedom::All, None);
+        let another = fit(&subject, &[], FreeParameters::All, None);
         let readings = observed.dataset.rows.len() * sensor.scalars();
         let factor = if sensor == Sensor::Cable { CHANGED_CABLE } else { CHANGED };
         let another_mm = rms(&errors_on(observed, &another.model, &another.frames))?;

@@ -12,10 +12,10 @@ use super::words;
 use crate::measurement::dataset::Dataset;
 
 /// Smallest share of the residual that makes a discrepancy a finding.
-const LEAST_SHARE: f64 = 0.3;
+const MIN_SHARE: f64 = 0.3;
 
 /// Number of rows listed, those with the largest discrepancy.
-const MOST_ROWS: usize = 10;
+const MAX_ROWS: usize = 10;
 
 /// Ratio of residual to noise floor from which the residual is reported.
 const FLOOR_RATIO: f64 = 1.5;
@@ -56,7 +56,7 @@ impl Unexplained<'_> {
     }
 
     fn is_large(&self, mm: f64) -> bool {
-        mm > LEAST_SHARE * self.after.fitted.rmse
+        mm > MIN_SHARE * self.after.fitted.rmse
     }
 
     /// What is not noise (mm), for each row: the discrepancy and the scatter about a joint.
@@ -130,7 +130,7 @@ impl Unexplained<'_> {
             let mut order: Vec<usize> = (0..effect.len()).collect();
             order.sort_by(|&a, &b| effect[b].total_cmp(&effect[a]).then(a.cmp(&b)));
             let mut rows: Vec<usize> =
-                order.iter().take(MOST_ROWS).map(|&i| self.dataset.rows[i].number).collect();
+                order.iter().take(MAX_ROWS).map(|&i| self.dataset.rows[i].number).collect();
             rows.sort_unstable();
             let follows = if self.smoothed.is_some() {
                 "; a smooth correction without a physical cause follows part of it"
@@ -185,7 +185,7 @@ impl Unexplained<'_> {
 }
 
 /// Most poses that are handed to a planner.
-const MOST_POSES: usize = 300;
+const MAX_POSES: usize = 300;
 
 /// The same for a planner, of the searched rows.
 pub(super) fn something_else(dataset: &Dataset, confirmed: &Confirmed) -> SomethingElse {
@@ -223,7 +223,7 @@ fn remaining(dataset: &Dataset, confirmed: &Confirmed) -> Vec<RemainingAt> {
         }
     }
     let sums: Vec<_> = sums.into_iter().flatten().collect();
-    let stride = sums.len().div_ceil(MOST_POSES).max(1);
+    let stride = sums.len().div_ceil(MAX_POSES).max(1);
     sums.into_iter()
         .step_by(stride)
         .map(|(row, readings, sum)| RemainingAt {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::algebra::{back_and_forth, factored};
 use super::change_points::added_squares;
-use super::extension::{Extended, Freedom, SEARCH_STEPS, Subject};
+use super::extension::{Extended, FreeParameters, SEARCH_STEPS, Subject};
 use super::held_out::neither;
 use super::newton;
 use crate::identification::fit::{Observations, errors_on};
@@ -240,5 +240,5 @@ fn with_uncertain_sides(mut errors: Vec<f64>, rows: &[usize], added: &[f64]) -> 
 
 /// The fit of frames alone, with the links of the data sheet: the stage `nominal` of a diagnosis.
 pub fn nominal(subject: &Subject<'_>) -> Extended {
-    super::extension::fit(subject, &[], Freedom::Frames, None)
+    super::extension::fit(subject, &[], FreeParameters::Frames, None)
 }

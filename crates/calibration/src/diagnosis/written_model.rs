@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use super::cause::Cause;
 use super::design::{Linear, linearised};
 use super::discrepancy::Discrepancy;
-use super::extension::{Extended, Freedom, Subject, filled, fit};
+use super::extension::{Extended, FreeParameters, Subject, filled, fit};
 use super::link_growth;
 use super::selection::contains_cause;
 use super::sensor_discrepancy;
@@ -74,7 +74,7 @@ pub(super) fn time_discrepancy(discrepancy: Option<&Discrepancy>) -> Option<&Dis
 }
 
 fn refit(subject: &Subject<'_>, causes: &[Cause], near: &Extended) -> Extended {
-    fit(subject, causes, Freedom::All, Some(near))
+    fit(subject, causes, FreeParameters::All, Some(near))
 }
 
 /// The fit with its covariance under serially correlated noise.

@@ -152,8 +152,8 @@ pub struct Start<'a> {
 }
 
 /// Lower bound of the noise estimate (mm): below it, weights would only amplify rounding.
-const SMALLEST_SIGMA_MM: f64 = 1e-4;
-const SMALLEST_SIGMA_RAD: f64 = 1e-6;
+const MIN_SIGMA_MM: f64 = 1e-4;
+const MIN_SIGMA_RAD: f64 = 1e-6;
 
 /// Fits `parameters` to `observed` and estimates the sensor's standard deviation, alternating in three rounds; likewise the
 /// prior widths of the links where [`Tolerance::learn_widths`] is set.
@@ -245,12 +245,12 @@ struct StepBudget {
 const WORK: usize = 5_000_000_000;
 
 /// Smallest budget.
-const FEWEST_STEPS: usize = 100;
+const MIN_STEPS: usize = 100;
 
 impl StepBudget {
     fn of(observed: &Observations, parameters: &[Parameter]) -> Self {
         let step = observed.dataset.rows.len() * parameters.len() * parameters.len();
-        Self { left: (WORK / step.max(1)).max(FEWEST_STEPS) }
+        Self { left: (WORK / step.max(1)).max(MIN_STEPS) }
     }
 
     fn solve(&mut self, solver: &Solver, problem: &CalibrationProblem, start: &[f64], seed: u64) -> Estimate {
@@ -293,8 +293,8 @@ fn noise_sigmas(
         }
         high.exp()
     };
-    let mm = solve(0..per.min(3), |share| share.0, SMALLEST_SIGMA_MM);
-    let rad = if per > 3 { solve(3..per, |share| share.1, SMALLEST_SIGMA_RAD) } else { 1e-3 };
+    let mm = solve(0..per.min(3), |share| share.0, MIN_SIGMA_MM);
+    let rad = if per > 3 { solve(3..per, |share| share.1, MIN_SIGMA_RAD) } else { 1e-3 };
     (mm, rad)
 }
 
@@ -379,7 +379,7 @@ pub fn outliers(
         let sizes: Vec<f64> = errors.iter().zip(&base).map(|(e, w)| e.abs() * w.per_mm).collect();
         let spread = (median(&sizes).unwrap_or(1.0) * consistency).max(1e-9);
         scaled = sizes.iter().map(|s| s / spread).collect();
-        sigma = (sigma * spread).max(SMALLEST_SIGMA_MM);
+        sigma = (sigma * spread).max(MIN_SIGMA_MM);
         for (f, s) in factor.iter_mut().zip(&scaled) {
             *f = 1.0 / (1.0 + (s / CAUCHY).powi(2)).sqrt();
         }

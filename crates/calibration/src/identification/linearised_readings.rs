@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use crate::identification::fit::Fitted;
-use crate::identification::scaled_cholesky::{MANY, factorise, gram};
+use crate::identification::scaled_cholesky::{MANY_COLUMNS, factorise, gram};
 use crate::identification::sensor_laws::{SensorErrors, SensorLaw, mean_reading};
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};
@@ -161,7 +161,7 @@ const PART: usize = 4 * ROWS;
 /// Adds AᵀA of readings to the lower triangle of `sum`. Many columns are mostly knots of error maps, of which a block of rows reaches few; the
 /// kernel skips the others, but takes whole groups of rows.
 fn add_gram(a: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
-    if a.ncols() > MANY && a.nrows().is_multiple_of(WIDTH) {
+    if a.ncols() > MANY_COLUMNS && a.nrows().is_multiple_of(WIDTH) {
         add_products(a.as_slice(), a.nrows(), sum.as_mut_slice());
     } else {
         *sum += gram(a);

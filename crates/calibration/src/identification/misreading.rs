@@ -24,7 +24,7 @@ const CLOCKS_DIFFER: &str =
     ", or the clocks of tracker and controller differ by the time between two rows (--points-ahead)";
 
 /// Fewest rows to which a frame is fitted.
-const FEWEST: usize = 8;
+const MIN_ROWS: usize = 8;
 
 /// The end of a message that readings are of no arm like this: what explains them, or what to check.
 pub(crate) fn advice(explanation: Option<&str>) -> String {
@@ -38,7 +38,7 @@ pub(crate) fn advice(explanation: Option<&str>) -> String {
 
 /// What else the readings may be, in a sentence part; `None` where nothing explains them.
 pub(crate) fn explanation(dataset: &Dataset, nominal: &Model) -> Option<String> {
-    if dataset.sensor != Sensor::Position || dataset.rows.len() < 2 * FEWEST {
+    if dataset.sensor != Sensor::Position || dataset.rows.len() < 2 * MIN_ROWS {
         return None;
     }
     let case = Case { dataset, nominal, most_mm: SHARE * typical_mm(dataset, nominal)? };
@@ -81,7 +81,7 @@ impl Case<'_> {
             let rows =
                 (0..self.dataset.rows.len()).filter(|row| self.dataset.rows[*row].session() == Some(*name));
             let rows: Vec<usize> = rows.collect();
-            rows.len() >= FEWEST && self.fits(&self.dataset.subset(&rows))
+            rows.len() >= MIN_ROWS && self.fits(&self.dataset.subset(&rows))
         };
         (names.len() > 1 && names.iter().all(fits)).then(|| {
             format!(

@@ -24,7 +24,7 @@ use truegrind_math::distribution::wilson_hilferty;
 use truegrind_math::tail::chi_square_tail;
 
 /// Fewest differences that show a pattern.
-const FEWEST: usize = 4;
+const MIN_DIFFERENCES: usize = 4;
 /// Probability of a chance pattern in common.
 const CHANCE: f64 = 1e-3;
 /// The same as a normal quantile.
@@ -36,9 +36,9 @@ const UNEQUAL: f64 = 5.5;
 /// Variance of the larger differences over that of the others from which they are of another kind.
 const LARGER: f64 = 12.0;
 /// Differences from which their sizes are judged, evenly in their order.
-const MOST_SQUARES: usize = 2000;
+const MAX_SQUARES: usize = 2000;
 /// Share of larger differences up to which they are single gross readings.
-const FEW: f64 = 0.25;
+const MAX_GROSS_SHARE: f64 = 0.25;
 
 /// What the scatter of repeated poses is made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +78,7 @@ impl Repeats {
             without_gross: 1.0,
         };
         let differences = differences(dataset);
-        if differences.len() < FEWEST {
+        if differences.len() < MIN_DIFFERENCES {
             return plain;
         }
         let residuals = residuals_mm(dataset, fitted);
@@ -223,7 +223,7 @@ impl Case<'_> {
     /// Of the larger differences the row with the larger residual, where there are few of them.
     fn gross_rows(&self, differences: &[Difference], mixture: &Mixture) -> Vec<usize> {
         let larger: Vec<&Difference> = mixture.larger(differences);
-        if larger.len() as f64 > FEW * differences.len() as f64 {
+        if larger.len() as f64 > MAX_GROSS_SHARE * differences.len() as f64 {
             return Vec::new();
         }
         let size = |row: usize| self.residuals[row].norm_squared();
@@ -369,7 +369,7 @@ impl Mixture {
         squares.sort_by(f64::total_cmp);
         // There can be a million.
         let squares: Vec<f64> =
-            squares.iter().copied().step_by(squares.len().div_ceil(MOST_SQUARES)).collect();
+            squares.iter().copied().step_by(squares.len().div_ceil(MAX_SQUARES)).collect();
         let count = squares.len() as f64;
         let axes = axes as f64;
         let one_size = squares.iter().sum::<f64>() / (axes * count);

@@ -77,19 +77,19 @@ pub(crate) struct Asked<'a> {
 }
 
 /// Difference of the criteria from which one model is true: twice the log Bayes factor, 20 to 1, as of an identified cause.
-const CLEAR: f64 = 6.0;
+const CLEAR_TWICE_LOG_BF: f64 = 6.0;
 
 /// Fewest scalar readings.
-const FEWEST: usize = 60;
+const MIN_READINGS: usize = 60;
 
 /// Most rows that are looked at; they are evenly spaced.
-const MOST_ROWS: usize = 400;
+const MAX_ROWS: usize = 400;
 
 /// Steps of a maximisation.
 const STEPS: usize = 60;
 
 /// Least part of the mean square residual that rounding would make for it to be looked for.
-const LEAST_SHARE: f64 = 0.05;
+const MIN_SHARE: f64 = 0.05;
 
 /// A row: its residual (mm), and the movement for a step's standard deviation about each joint. A cable has one coordinate; the others are
 /// known to be 0.
@@ -104,9 +104,9 @@ impl Asked<'_> {
         let Some(rows) = self.rows() else { return Rounding::Undecided };
         let [exact, rounded] = [0.0, 1.0].map(|known| rows.best(known));
         let against_exact = exact.criterion - rounded.criterion;
-        if against_exact < -CLEAR {
+        if against_exact < -CLEAR_TWICE_LOG_BF {
             Rounding::Exact
-        } else if against_exact < CLEAR {
+        } else if against_exact < CLEAR_TWICE_LOG_BF {
             Rounding::Undecided
         } else {
             Rounding::Rounded(rows.told_by(&rounded))
@@ -128,10 +128,10 @@ impl Asked<'_> {
             (0..dataset.rows.len()).filter(|row| !self.set_aside.contains(row)).collect();
         let axes = dataset.sensor.axes();
         let scalars = (counted.len() * axes) as f64;
-        if counted.len() * axes < FEWEST || self.spent > 0.5 * scalars {
+        if counted.len() * axes < MIN_READINGS || self.spent > 0.5 * scalars {
             return None;
         }
-        let chosen: Vec<usize> = counted.iter().step_by(counted.len().div_ceil(MOST_ROWS)).copied().collect();
+        let chosen: Vec<usize> = counted.iter().step_by(counted.len().div_ceil(MAX_ROWS)).copied().collect();
         // As large as they would be had no parameter followed them.
         let freed = (1.0 - self.spent / scalars).sqrt().recip();
         let list = self.list(&chosen, sigma_rad, freed);
@@ -139,7 +139,7 @@ impl Asked<'_> {
         let rows = Rows { list, axes, repeats };
         let square = rows.mean(|row| row.residual.norm_squared());
         let by_rounding = rows.mean(|row| row.by_joint.norm_squared());
-        (square.is_finite() && by_rounding > LEAST_SHARE * square).then_some(rows)
+        (square.is_finite() && by_rounding > MIN_SHARE * square).then_some(rows)
     }
 
     /// The chosen rows, with angles of this standard deviation and residuals that are `freed` times as large.

@@ -6,7 +6,7 @@ use faer::{MatMut, MatRef, Par};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Above this number of columns products and factors run in blocks.
-pub(super) const MANY: usize = 90;
+pub(super) const MANY_COLUMNS: usize = 90;
 
 /// A Cholesky factor of a matrix that was scaled to a unit diagonal.
 pub(super) struct ScaledCholesky {
@@ -21,7 +21,7 @@ impl ScaledCholesky {
 
     pub(super) fn inverse(&self) -> DMatrix<f64> {
         let n = self.size.len();
-        let unit = if n > MANY { blocked_inverse(&self.factor) } else { self.factor.inverse() };
+        let unit = if n > MANY_COLUMNS { blocked_inverse(&self.factor) } else { self.factor.inverse() };
         DMatrix::from_fn(unit.nrows(), unit.ncols(), |i, j| unit[(i, j)] * self.size[i] * self.size[j])
     }
 }
@@ -34,7 +34,7 @@ pub(super) fn factorise(matrix: &DMatrix<f64>) -> Option<(ScaledCholesky, f64)> 
         return None;
     }
     let unit = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * size[i] * size[j]);
-    let factor = if unit.nrows() > MANY { blocked_cholesky(unit)? } else { Cholesky::new(unit)? };
+    let factor = if unit.nrows() > MANY_COLUMNS { blocked_cholesky(unit)? } else { Cholesky::new(unit)? };
     let determinant: f64 = factor.l_dirty().diagonal().iter().map(|v| 2.0 * v.ln()).sum();
     let scaling: f64 = size.iter().map(|s| 2.0 * s.ln()).sum();
     Some((ScaledCholesky { factor, size }, determinant - scaling))
@@ -42,7 +42,7 @@ pub(super) fn factorise(matrix: &DMatrix<f64>) -> Option<(ScaledCholesky, f64)> 
 
 /// AᵀA, in blocks for many columns.
 pub(super) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
-    if a.ncols() > MANY { a.transpose() * a } else { a.tr_mul(a) }
+    if a.ncols() > MANY_COLUMNS { a.transpose() * a } else { a.tr_mul(a) }
 }
 
 /// Cholesky factor of a large matrix, in blocks.

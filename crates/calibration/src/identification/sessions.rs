@@ -10,7 +10,7 @@ use super::repeats::residuals_mm;
 use crate::measurement::dataset::Dataset;
 
 /// Fewest rows of a session that is judged.
-const FEWEST: usize = 8;
+const MIN_ROWS: usize = 8;
 /// Standard errors by which means must differ.
 const SIGNIFICANT: f64 = 8.0;
 /// How many times the scatter within sessions they must differ by.
@@ -47,7 +47,7 @@ pub(super) fn set_up_anew(dataset: &Dataset, fitted: &Fitted) -> Option<String> 
         session.sum += mm;
         session.square += mm.norm_squared();
     }
-    sessions.retain(|_, session| session.count >= FEWEST as f64);
+    sessions.retain(|_, session| session.count >= MIN_ROWS as f64);
     let count: f64 = sessions.values().map(|session| session.count).sum();
     let scatter: f64 = sessions.values().map(Sum::scatter).sum();
     let scatter_mm = (scatter / (count - sessions.len() as f64).max(1.0)).sqrt();

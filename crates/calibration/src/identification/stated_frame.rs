@@ -136,7 +136,7 @@ pub fn target_contradiction_by_fit(
     let stated = with_touched_point(dataset, nominal, touched, found.clone());
     let with = fitted_beside(&stated, Tolerance { target_mm: sigma_mm, ..*of_arm }, (dataset, nominal));
     if of_arm.scale.is_none() {
-        widen_by_scale(&mut free, dataset, WIDEST_SCALE);
+        widen_by_scale(&mut free, dataset, MAX_SCALE_ERROR);
     }
     let own: Vec<usize> = (0..free.parameters.len())
         .filter(|&k| matches!(free.parameters[k], Parameter::Target(0..3)))
@@ -220,7 +220,7 @@ const CONTRADICTS: f64 = 50.0;
 /// How many times the error that geometry leaves the stated frame must be off: what else is wrong with an arm shifts the frame too.
 const OF_FIT: f64 = 3.0;
 /// Relative error of the sensor's scale, where none is stated.
-const WIDEST_SCALE: f64 = 1e-2;
+const MAX_SCALE_ERROR: f64 = 1e-2;
 
 /// What speaks against a stated frame, or a cable's outlet and zero, of standard deviation `sigma` (mm; rad), beside `geometry`, fitted
 /// with free frames to readings whose scale is right to `scale`; `None` if nothing does.
@@ -233,7 +233,7 @@ pub fn contradiction_beside_geometry(
 ) -> Option<String> {
     if scale.is_none() {
         // What is stated is in the covariance.
-        widen_by_scale(&mut geometry, dataset, WIDEST_SCALE);
+        widen_by_scale(&mut geometry, dataset, MAX_SCALE_ERROR);
     }
     let own: Vec<usize> =
         (0..geometry.parameters.len()).filter(|&k| is_of_frame(&geometry.parameters[k])).collect();
@@ -244,7 +244,7 @@ pub fn contradiction_beside_geometry(
         .map(|&k| difference(&geometry.parameters[k], stated, &geometry.frames, &centre))
         .unzip::<f64, f64, Vec<f64>, Vec<f64>>();
     let (difference, by_scale) =
-        (DVector::from_vec(difference), DVector::from_vec(by_scale) * scale.unwrap_or(WIDEST_SCALE));
+        (DVector::from_vec(difference), DVector::from_vec(by_scale) * scale.unwrap_or(MAX_SCALE_ERROR));
     let of_stated = DMatrix::from_diagonal(&DVector::from_iterator(
         own.len(),
         own.iter().map(|&k| {

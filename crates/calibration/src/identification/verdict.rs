@@ -214,16 +214,16 @@ fn spoils(scale: &ScaleError) -> bool {
 /// ```
 pub fn percent_of(probability: f64) -> String {
     match 100.0 * probability {
-        p if p > MOST_PERCENT => "over 99.9 %".to_owned(),
-        p if p < LEAST_PERCENT => "under 0.1 %".to_owned(),
+        p if p > MAX_PERCENT => "over 99.9 %".to_owned(),
+        p if p < MIN_PERCENT => "under 0.1 %".to_owned(),
         p => format!("{p:.1} %"),
     }
 }
 
 /// Probabilities (%) beyond which [`percent_of`] states a bound.
-pub const LEAST_PERCENT: f64 = 0.1;
+pub const MIN_PERCENT: f64 = 0.1;
 /// The upper one.
-pub const MOST_PERCENT: f64 = 99.9;
+pub const MAX_PERCENT: f64 = 99.9;
 
 /// The expected benefit in words.
 fn benefit_sentence(found: &Benefit) -> String {

@@ -19,12 +19,12 @@ pub struct NoiseFloor {
 }
 
 /// Fewest degrees of freedom of a known noise floor: of one repeated pose the scatter is right to a factor of ten or so.
-const FEWEST_FREEDOM: usize = 4;
+const MIN_FREEDOM: usize = 4;
 
 impl NoiseFloor {
     /// Whether enough poses were repeated for the scatter to be that of the sensor.
     pub fn is_known(&self) -> bool {
-        self.freedom >= FEWEST_FREEDOM
+        self.freedom >= MIN_FREEDOM
     }
 }
 
@@ -61,7 +61,7 @@ pub fn noise_floor_beside_shift(data: &Dataset) -> Option<NoiseFloor> {
     let are_copied = repeats_of_readings(data).are_copied();
     let groups = readings_of_poses(data);
     let count = data.rows.len();
-    let step = count.div_ceil(MOST_CUTS).max(1);
+    let step = count.div_ceil(MAX_CUTS).max(1);
     let floors = (step..count).step_by(step).filter_map(|cut| floor_on_either_side(&groups, are_copied, cut));
     let best = floors.filter(|floor| 2.0 * floor.sigma_mm < whole.sigma_mm);
     // Of few repetitions that are left the scatter may be small by chance.
@@ -70,9 +70,9 @@ pub fn noise_floor_beside_shift(data: &Dataset) -> Option<NoiseFloor> {
 }
 
 /// Places of a shift that are tried.
-const MOST_CUTS: usize = 64;
+const MAX_CUTS: usize = 64;
 /// Fewest poses that were measured before and after a shift.
-const FEWEST_ACROSS: usize = 4;
+const MIN_ACROSS: usize = 4;
 /// Share of the differences across a shift that their mean must explain.
 const IN_COMMON: f64 = 0.7;
 
@@ -134,7 +134,7 @@ fn floor_on_either_side(groups: &[Readings], are_copied: bool, cut: usize) -> Op
     let count = across.len() as f64;
     let common = across.iter().sum::<Vector3<f64>>().norm_squared() / count;
     let all: f64 = across.iter().map(Vector3::norm_squared).sum();
-    let is_shift = across.len() >= FEWEST_ACROSS && common > IN_COMMON * all;
+    let is_shift = across.len() >= MIN_ACROSS && common > IN_COMMON * all;
     scatter.pooled().filter(|floor| is_shift && floor.is_known())
 }
 

@@ -15,7 +15,7 @@ use truegrind_math::statistics::median;
 const TOOL_MM: f64 = 1000.0;
 
 /// Most rows that are left out, as a share: more are in another unit, or of another arm.
-const MOST: f64 = 0.1;
+const MAX_LEFT_OUT_SHARE: f64 = 0.1;
 
 /// Leaves out readings farther from the median of all than the arm is long, with a note.
 pub(super) fn without_impossible_readings(dataset: &mut Dataset, nominal: &Model) {
@@ -32,7 +32,7 @@ pub(super) fn without_impossible_readings(dataset: &mut Dataset, nominal: &Model
     }
     let is_possible = |i: &usize| from_middle_mm[*i] <= diameter_mm;
     let (kept, left_out): (Vec<usize>, Vec<usize>) = (0..places.len()).partition(is_possible);
-    if left_out.is_empty() || left_out.len() as f64 > MOST * places.len() as f64 {
+    if left_out.is_empty() || left_out.len() as f64 > MAX_LEFT_OUT_SHARE * places.len() as f64 {
         return;
     }
     let numbers: Vec<usize> = left_out.iter().map(|&i| dataset.rows[i].number).collect();

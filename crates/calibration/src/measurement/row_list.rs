@@ -3,15 +3,15 @@
 use truegrind_math::sentence::listed;
 
 /// Most numbers that a sentence lists.
-const MOST: usize = 8;
+const MAX_LISTED: usize = 8;
 
 /// `row 7`, `rows 3, 4 and 7`, or the first few and how many more there are.
 pub(super) fn row_list(numbers: &[usize]) -> String {
-    let more = numbers.len().saturating_sub(MOST);
+    let more = numbers.len().saturating_sub(MAX_LISTED);
     let further = (more > 0).then(|| format!("{more} more"));
     match numbers {
         [] => "no row".to_owned(),
         [one] => format!("row {one}"),
-        all => format!("rows {}", listed(all.iter().take(MOST).map(usize::to_string).chain(further))),
+        all => format!("rows {}", listed(all.iter().take(MAX_LISTED).map(usize::to_string).chain(further))),
     }
 }

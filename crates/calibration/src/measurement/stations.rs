@@ -16,12 +16,12 @@ use truegrind_arm::model::Model;
 use truegrind_math::se3::Pose;
 
 /// Fewest rows that place a station well: twice as many readings as unknowns.
-const FEWEST: usize = 4;
+const MIN_ROWS: usize = 4;
 
 /// The rows of a station do not say where it stood.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "{file}: the rows of station {station} (column station: {}) do not determine where it stood: measure at least {FEWEST} poses that are not on \
+    "{file}: the rows of station {station} (column station: {}) do not determine where it stood: measure at least {MIN_ROWS} poses that are not on \
      one line from each station, and spell its name the same way in all of its rows",
     row_list(.numbers)
 )]
@@ -105,7 +105,9 @@ fn placed_by_arm(
         .ok_or_else(|| unplaced(largest))?;
     let place = |(station, rows): (usize, &Vec<usize>)| {
         let fit = known_target(&flanges(rows), &places(rows), &target_mm);
-        fit.filter(|_| rows.len() >= FEWEST).map(|fit| fit.base_from_sensor).ok_or_else(|| unplaced(station))
+        fit.filter(|_| rows.len() >= MIN_ROWS)
+            .map(|fit| fit.base_from_sensor)
+            .ok_or_else(|| unplaced(station))
     };
     stations.iter().enumerate().map(place).collect()
 }
@@ -127,13 +129,13 @@ pub(crate) fn without_frames(train: &Dataset, test: &Dataset, errors: Vec<f64>) 
         (0..stations).map(|station| FrameVariance::of(train, station)).collect();
     let own = |(row, error): (&Row, f64)| {
         let variance = frames[row.anchor].as_ref()?.at(&row.reading.place_mm());
-        (variance < MOST_OF_FRAME).then(|| error / (1.0 + variance).sqrt())
+        (variance < MAX_OF_FRAME).then(|| error / (1.0 + variance).sqrt())
     };
     test.rows.iter().zip(errors).map(own).collect()
 }
 
 /// Variance of a frame, in that of a reading, beyond which a held-out row shows nothing of the arm.
-const MOST_OF_FRAME: f64 = 3.0;
+const MAX_OF_FRAME: f64 = 3.0;
 
 /// Where the readings of a station leave its frame uncertain.
 struct FrameVariance {

@@ -125,7 +125,7 @@ impl Alarm {
 /// Value and standard deviation with the digits that tell something: two of the standard deviation, four decimals where these are enough.
 fn with_sigma(value: f64, sigma: f64) -> String {
     let places = if sigma > 0.0 && sigma.is_finite() { 1.0 - sigma.log10().floor() } else { 4.0 };
-    if places > MOST_DECIMALS {
+    if places > MAX_DECIMALS {
         let exponent = value.abs().max(sigma).log10().floor() as i32;
         let scale = 10f64.powi(-exponent);
         let decimals = (places as i32 + exponent).max(0) as usize;
@@ -136,7 +136,7 @@ fn with_sigma(value: f64, sigma: f64) -> String {
 }
 
 /// Most decimals without an exponent.
-const MOST_DECIMALS: f64 = 6.0;
+const MAX_DECIMALS: f64 = 6.0;
 
 impl Alarm {
     fn fmt_mounted(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

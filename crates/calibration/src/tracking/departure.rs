@@ -79,7 +79,7 @@ impl Tracker {
         let step = samples.len().div_ceil(POSES).max(1);
         let poses: Vec<Joints> =
             samples.iter().step_by(step).map(|sample| Joints::from(sample.map(f64::to_radians))).collect();
-        if poses.len() < FEWEST {
+        if poses.len() < MIN_POSES {
             return None;
         }
         let target = self.frames.flange_from_target.translation.vector;
@@ -204,4 +204,4 @@ impl Distance {
 }
 
 /// Fewest poses of a comparison: placement has nine parameters.
-const FEWEST: usize = 8;
+const MIN_POSES: usize = 8;

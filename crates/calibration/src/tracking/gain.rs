@@ -15,9 +15,9 @@ use crate::tracking::bounds::outlier_bound;
 use truegrind_estimation::problem::Problem;
 
 /// Fewest poses of a judgement.
-const FEWEST: usize = 30;
+const MIN_POSES: usize = 30;
 /// Latest poses that are judged at most.
-const MOST: usize = 200;
+const MAX_POSES: usize = 200;
 /// Standard deviations of the mean by which squared errors must differ: 1 in 1000.
 const SIGNIFICANT: f64 = 3.1;
 /// Steps that place sensor and target under the model in use.
@@ -68,8 +68,8 @@ impl Tracker {
         let bound = outlier_bound(self.state.sensor.scalars());
         let is_used = |record: &&PoseRecord| record.predicted_mm.is_some() && record.nis <= bound;
         let kept: Vec<PoseRecord> = history.iter().skip(from).filter(is_used).cloned().collect();
-        let latest = kept.len().saturating_sub(MOST);
-        (kept.len() >= FEWEST).then(|| kept[latest..].to_vec())
+        let latest = kept.len().saturating_sub(MAX_POSES);
+        (kept.len() >= MIN_POSES).then(|| kept[latest..].to_vec())
     }
 
     fn gain_on(&self, records: &[PoseRecord]) -> Option<Gain> {

@@ -49,7 +49,7 @@ const UNLIKE: f64 = 0.4;
 const SHARE: f64 = 0.5;
 
 /// A point nearer to axis 6 tells nothing of joint 6 (mm).
-const NEAREST_MM: f64 = 5.0;
+const MIN_LEVER_MM: f64 = 5.0;
 
 /// Largest zero that joint 6 is likely to lose (rad).
 pub(super) const ZERO_LOST_RAD: f64 = 0.09;
@@ -110,7 +110,7 @@ impl Tracker {
         let radius_mm = about.rows(0, 3).norm();
         let (angle_rad, moved_mm) = match alarm.unit.as_str() {
             "rad" => (alarm.shift, alarm.shift.abs() * radius_mm),
-            _ => (alarm.shift / radius_mm.max(NEAREST_MM), alarm.shift),
+            _ => (alarm.shift / radius_mm.max(MIN_LEVER_MM), alarm.shift),
         };
         LastLink { angle_rad, sigma_rad: 0.0, moved_mm, reported: None, is_significant: true }
     }
@@ -139,7 +139,7 @@ impl Tracker {
         let length = moved.norm();
         let sigma_mm = along(&(&moved / length.max(f64::MIN_POSITIVE)));
         let moved_mm = moved.rows(0, 3).norm();
-        if about.rows(0, 3).norm() < NEAREST_MM {
+        if about.rows(0, 3).norm() < MIN_LEVER_MM {
             let none =
                 LastLink { angle_rad: 0.0, sigma_rad: 0.0, moved_mm, reported: None, is_significant: false };
             return Some(Seen { moved: none, sigma_mm });

@@ -22,7 +22,7 @@ use truegrind_estimation::filter::rls::RecursiveLeastSquares;
 use truegrind_math::se3::{Pose, pose_from_vector, vector_from_pose};
 
 /// Fewest consecutive outliers that are tested.
-const FEWEST: usize = 6;
+const MIN_OUTLIERS: usize = 6;
 /// Locations agree within this number of standard deviations of a reading.
 const AGREE: f64 = 6.0;
 /// The arm may have changed at the same time: they also agree within this length (mm), if it is no more than this share of how far the
@@ -77,7 +77,7 @@ impl Tracker {
     /// If the latest poses agree on a remounted target or sensor, continues the track there and returns the alarm.
     pub(super) fn detect_remount(&mut self, beside: Beside) -> Option<Alarm> {
         let run = self.trailing_outliers();
-        if run < FEWEST || self.state.sensor == Sensor::Cable {
+        if run < MIN_OUTLIERS || self.state.sensor == Sensor::Cable {
             return None;
         }
         let history = &self.state.history;
@@ -297,7 +297,7 @@ impl Agreement {
         let count = |pose: &Pose| poses.iter().filter(|other| agrees(pose, other)).count();
         let best = poses.iter().max_by_key(|pose| count(pose))?;
         let own: Vec<&Pose> = poses.iter().filter(|other| agrees(best, other)).collect();
-        if own.len() < FEWEST || 5 * own.len() < 4 * poses.len() {
+        if own.len() < MIN_OUTLIERS || 5 * own.len() < 4 * poses.len() {
             return None;
         }
         let share = 1.0 / own.len() as f64;

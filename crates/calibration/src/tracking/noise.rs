@@ -38,7 +38,7 @@ const SPREAD: f64 = 0.6;
 const WORSE: f64 = 2.0;
 
 /// Poses before the noise is judged in words.
-const FEW: usize = 30;
+const MIN_POSES: usize = 30;
 
 /// Readings that scatter far less than the track counts with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +55,7 @@ impl Tracker {
     /// Noise that the readings show to be too large by far; `None` where it is not, or where poses are few.
     pub fn overstated_noise(&self) -> Option<Overstated> {
         let history = &self.state.history;
-        let scatter = self.scatter(history.len()).filter(|s| history.len() >= FEW && *s < FAR)?;
+        let scatter = self.scatter(history.len()).filter(|s| history.len() >= MIN_POSES && *s < FAR)?;
         Some(Overstated {
             sigma_mm: self.state.sigma_mm,
             seen_mm: scatter * self.state.sigma_mm,

@@ -55,7 +55,7 @@ fn first_covariance(model: &Estimated, parameters: &[Parameter]) -> DMatrix<f64>
     }
     .priors(parameters, &model.model);
     DMatrix::from_fn(p, p, |i, j| match (i < arm && j < arm, i == j) {
-        (true, _) => model.covariance[(i, j)] + if i == j { SMALLEST_VARIANCE } else { 0.0 },
+        (true, _) => model.covariance[(i, j)] + if i == j { MIN_VARIANCE } else { 0.0 },
         (false, true) => priors[i].sigma * priors[i].sigma,
         (false, false) => 0.0,
     })
@@ -431,7 +431,7 @@ impl Tracker {
 const FEW_OUTLIERS: usize = 5;
 
 /// Added to the model's variances, as its covariance can be singular to rounding; negligible beside any tolerance (mm², rad²).
-const SMALLEST_VARIANCE: f64 = 1e-14;
+const MIN_VARIANCE: f64 = 1e-14;
 
 fn process_noise(parameter: &Parameter, options: &Options) -> f64 {
     if let Some(own) = options.drift.get(&parameter.to_string()) {

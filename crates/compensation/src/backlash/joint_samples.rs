@@ -16,17 +16,17 @@ use truegrind_programs::motion::{MotionKind, Switch};
 const SAMPLE_MM: f64 = 25.0;
 const SAMPLE_RAD: f64 = 0.1;
 /// Most samples of a path.
-const MOST_SAMPLES: usize = 64;
+const MAX_SAMPLES: usize = 64;
 /// A shorter path has one sample (mm, rad): its joints are almost a parabola.
 const SHORT_MM: f64 = 5.0;
 const SHORT_RAD: f64 = 0.02;
 /// How often the sampling is made four times denser where the samples disagree on where a joint reverses.
 const REFINEMENTS: u32 = 3;
 /// Most samples of a refined path.
-const MOST_REFINED: usize = 256;
+const MAX_REFINED: usize = 256;
 
 /// A larger joint step between neighbouring samples means that the path passes a singularity (rad).
-const MOST_STEP_RAD: f64 = 0.6;
+const MAX_STEP_RAD: f64 = 0.6;
 
 /// Samples of all motions (`None` where the arm cannot follow) and the share at which each circle point is passed. Where
 /// every other sample implies other reversals than all samples do, the sampling is refined.
@@ -83,20 +83,14 @@ pub(crate) fn by_wrist(
         let ends = [&from.joints, &to.joints];
         let mut count = pieces_of(&curve);
         loop {
-            let samples = wrist_interpolation::joint_samples(
-                nominal.arm(),
-                &within,
-                &curve,
-                ends,
-                count,
-                MOST_STEP_RAD,
-            );
+            let samples =
+                wrist_interpolation::joint_samples(nominal.arm(), &within, &curve, ends, count, MAX_STEP_RAD);
             let unchanged_for =
                 |samples: &SampledJoints| samples_agree(&from.joints, samples, &to.joints, half);
-            if count >= MOST_REFINED || samples.as_ref().is_some_and(unchanged_for) {
+            if count >= MAX_REFINED || samples.as_ref().is_some_and(unchanged_for) {
                 return Some(samples);
             }
-            count = (4 * count).min(MOST_REFINED);
+            count = (4 * count).min(MAX_REFINED);
         }
     };
     stops.iter().zip(before).map(of).collect()
@@ -157,7 +151,7 @@ impl Samples {
             && let Some((curve, within)) = path(from, to, frames_of)
         {
             passes = to.via.map_or(passes, |via| curve.passes(&via));
-            let pieces = (density * pieces_of(&curve)).min(MOST_REFINED);
+            let pieces = (density * pieces_of(&curve)).min(MAX_REFINED);
             for k in 1..pieces {
                 let s = k as f64 / pieces as f64;
                 self.shares.push(s);
@@ -190,23 +184,23 @@ impl Samples {
             }
             for (k, reached) in self.range(motion).zip(nominal.solve_path_joints(flanges, start)) {
                 let joints = reached.ok()?.joints;
-                let steady = (joints - last).amax() < MOST_STEP_RAD;
+                let steady = (joints - last).amax() < MAX_STEP_RAD;
                 last = joints;
                 steady.then(|| out.push((self.shares[k], joints)))?;
             }
-            ((end - last).amax() < MOST_STEP_RAD).then_some(out)
+            ((end - last).amax() < MAX_STEP_RAD).then_some(out)
         };
         let motions = self.ends.len();
-        let portions = search_budget::shared_out(
+        let chunks = search_budget::shared_out(
             SearchBudget::of(search_budget::SIDES),
-            motions.div_ceil(search_budget::PORTION),
-            |portion, budget| {
-                let first = portion * search_budget::PORTION;
-                let here = first..(first + search_budget::PORTION).min(motions);
+            motions.div_ceil(search_budget::CHUNK),
+            |chunk, budget| {
+                let first = chunk * search_budget::CHUNK;
+                let here = first..(first + search_budget::CHUNK).min(motions);
                 with_budget(budget, || here.map(of).collect::<Vec<_>>())
             },
         );
-        portions.into_iter().flatten().collect()
+        chunks.into_iter().flatten().collect()
     }
 }
 
@@ -222,5 +216,5 @@ fn pieces(length_mm: f64, turn_rad: f64) -> usize {
         return 2;
     }
     let wanted = (length_mm / SAMPLE_MM).max(turn_rad / SAMPLE_RAD).ceil();
-    (wanted as usize).next_multiple_of(2).clamp(4, MOST_SAMPLES)
+    (wanted as usize).next_multiple_of(2).clamp(4, MAX_SAMPLES)
 }

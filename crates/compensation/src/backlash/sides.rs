@@ -45,11 +45,11 @@ pub(crate) fn backlash_sides(
         let from_unsettled = from.is_some_and(|b| unsettled[b]);
         let from = from.filter(|_| !from_unsettled);
         let mut track = from.and_then(|b| tracks[b]);
-        let mut course = BacklashSides { turns: Vec::new(), end: [0; 6], via: [0; 6] };
+        let mut sides = BacklashSides { turns: Vec::new(), end: [0; 6], via: [0; 6] };
         match stop {
             MotionEnd::Unknown => track = None,
             MotionEnd::Unmoved if from_unsettled => unsettled[m] = true,
-            MotionEnd::Unmoved => course.end = track.map_or([0; 6], |track| track.map(|t| t.side)),
+            MotionEnd::Unmoved => sides.end = track.map_or([0; 6], |track| track.map(|t| t.side)),
             MotionEnd::At(reached) => {
                 let start = from.and_then(|b| match &stops[b] {
                     MotionEnd::At(start) => Some(start.joints),
@@ -75,22 +75,22 @@ pub(crate) fn backlash_sides(
                     here = std::array::from_fn(|j| PlayTrack::unknown(reached.joints[j], half[j]));
                     along = vec![Vec::new()];
                 }
-                course.via = agreed(along.iter().map(|samples| passing(here, reached, samples, passes[m])));
-                (course.turns, here) = arrive(here, reached, &along);
-                course.end = here.map(|t| t.side);
+                sides.via = agreed(along.iter().map(|samples| passing(here, reached, samples, passes[m])));
+                (sides.turns, here) = arrive(here, reached, &along);
+                sides.end = here.map(|t| t.side);
                 for joint in (0..6)
                     .filter(|&joint| unknown_sides.get(m).is_some_and(|unknown_sides| unknown_sides[joint]))
                 {
-                    course.forget(joint);
+                    sides.forget(joint);
                     here[joint].forget(reached.links.map(|links| links[joint]), reached.joints[joint]);
                 }
-                let open = course.end.map(|side| side == 0);
-                (0..6).filter(|&joint| open[joint]).for_each(|joint| course.forget(joint));
+                let open = sides.end.map(|side| side == 0);
+                (0..6).filter(|&joint| open[joint]).for_each(|joint| sides.forget(joint));
                 track = Some(here);
             }
         }
         tracks.push(track);
-        out.push(course);
+        out.push(sides);
     }
     out
 }

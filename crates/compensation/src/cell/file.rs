@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{FARTHEST_MM, Listing};
+use truegrind_programs::motion::{Listing, MAX_POSITION_MM};
 use truegrind_programs::nc::dialect::Dialect;
 use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup;
@@ -118,7 +118,7 @@ pub enum CellError {
     /// More teaching points of tools than can be processed.
     #[error(
         "tool \"{name}\": {points} teaching points, and the squares of these numbers are {work} for all \
-         tools together, expected at most {MOST_TEACHING}: four to ten points determine a TCP; keep those \
+         tools together, expected at most {MAX_TEACHING}: four to ten points determine a TCP; keep those \
          that differ most"
     )]
     TooManyPoints {
@@ -201,7 +201,7 @@ pub enum CellError {
 }
 
 /// Limit of the sum of squared numbers of teaching points of tools: 500 of one tool, ten of each of 2,500.
-const MOST_TEACHING: usize = 250_000;
+const MAX_TEACHING: usize = 250_000;
 
 /// A frame's section of a cell file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -233,7 +233,7 @@ impl CellFrame {
             return wrong("a name is expected, as the program writes it");
         }
         if let Some(position) = self.position_mm
-            && !position.iter().all(|x| x.abs() <= FARTHEST_MM)
+            && !position.iter().all(|x| x.abs() <= MAX_POSITION_MM)
         {
             return wrong("position_mm: expected three numbers in mm, within 1,000,000 mm");
         }
@@ -257,7 +257,7 @@ impl CellFrame {
             }
         }
         let found = self.teaching_deg.len();
-        if !self.teaching_deg.iter().flatten().all(|angle| angle.abs() <= setup::MOST_DEG) {
+        if !self.teaching_deg.iter().flatten().all(|angle| angle.abs() <= setup::MAX_JOINT_DEG) {
             return wrong("teaching_deg: expected joint angles in degrees");
         }
         if self.origin == FrameOrigin::Metrology && found > 0 {
@@ -399,7 +399,8 @@ impl Cell {
         if let Some(found) = cell.control.as_ref().filter(|word| Dialect::stated(word).is_none()) {
             return Err(CellError::Control { found: found.clone() });
         }
-        if let Some(found) = cell.start_deg.filter(|start| !start.iter().all(|q| q.abs() <= setup::MOST_DEG))
+        if let Some(found) =
+            cell.start_deg.filter(|start| !start.iter().all(|q| q.abs() <= setup::MAX_JOINT_DEG))
         {
             return Err(CellError::Start { found: format!("{found:?}") });
         }
@@ -418,7 +419,7 @@ impl Cell {
         }
         // The frame is recomputed for each angle of its points to determine the effect of rounding.
         let work: usize = cell.tool.iter().map(|tool| tool.teaching_deg.len().saturating_pow(2)).sum();
-        if work > MOST_TEACHING {
+        if work > MAX_TEACHING {
             let most = cell.tool.iter().max_by_key(|tool| tool.teaching_deg.len());
             let (name, points) = most.map_or(("", 0), |tool| (tool.name.as_str(), tool.teaching_deg.len()));
             return Err(CellError::TooManyPoints { name: name.to_owned(), points, work });

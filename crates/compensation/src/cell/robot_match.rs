@@ -33,7 +33,7 @@ pub fn program_robot_mismatch(name: &str, source: &[u8], robot: &str, nominal: &
 }
 
 /// A smaller number of motions proves nothing: a single one can be a mistake.
-const FEWEST: usize = 5;
+const MIN_MOTIONS: usize = 5;
 
 /// Motions that the arm does not reach, of a program of which it reaches hardly any.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +73,7 @@ pub fn unreachable_motions(plan: &Plan) -> Option<UnreachableMotions> {
     let mut configured = configured.peekable();
     let example = configured.peek().copied();
     // One target in fifty can be reachable by chance.
-    (all >= FEWEST && 50 * count >= 49 * all).then(|| UnreachableMotions {
+    (all >= MIN_MOTIONS && 50 * count >= 49 * all).then(|| UnreachableMotions {
         count,
         other_configuration: configured.count(),
         example,

@@ -9,7 +9,7 @@ use truegrind_programs::nc::setup;
 use truegrind_surfaces::SurfaceFile;
 
 /// Most unused entries that are listed one by one.
-const MOST_UNUSED: usize = 20;
+const MAX_UNUSED: usize = 20;
 
 /// The entries of a cell file that programs use.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -73,8 +73,8 @@ impl Used {
                 )
             };
             let mut out: Vec<String> = unused.map(say).collect();
-            let more = out.len().saturating_sub(MOST_UNUSED);
-            out.truncate(MOST_UNUSED);
+            let more = out.len().saturating_sub(MAX_UNUSED);
+            out.truncate(MAX_UNUSED);
             if more > 0 {
                 out.push(format!("cell file: {more} more [[{kind}]] are not used by any program"));
             }

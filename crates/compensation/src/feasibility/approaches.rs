@@ -11,10 +11,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use crate::cut::{CutsOf, Obstacle, StartsOf, follows_position, may_cut};
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::plan::reason::OutcomeReason;
+<<<<<<< HEAD
 use crate::search_budget::MANY;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
+=======
+use crate::search_budget::MANY_MOTIONS;
+use truegrind_programs::motion::{Listing, Motion, MotionKind};
+>>>>>>> repW
 
 /// The starts of the lines and arcs of a program.
 pub(crate) struct Starts<'a> {
@@ -65,7 +70,7 @@ impl<'a> Starts<'a> {
         shift: &Shift<'_>,
     ) -> Vec<(u32, OutcomeReason)> {
         let is_left = |index: u32| blocking_reason(index).is_some();
-        let motions = (0..self.listing.motions.len() as u32).into_par_iter().with_min_len(MANY);
+        let motions = (0..self.listing.motions.len() as u32).into_par_iter().with_min_len(MANY_MOTIONS);
         let mut open: Vec<u32> = motions.filter(|index| self.is_path(*index) && is_left(*index)).collect();
         let mut found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
         let mut cuts_found = BTreeSet::new();
@@ -117,10 +122,15 @@ impl<'a> Starts<'a> {
                     let uncorrected = match blocking_reason(start) {
                         None => found.get(&start).copied().or_else(of_cut),
                         Some((status, reason)) => {
+<<<<<<< HEAD
                             let is_refused =
                                 status == Status::Refused || matches!(reason, OutcomeReason::Risk { .. });
                             unknown = is_refused || shift.exceeds(index, true);
                             Some(reason).filter(|_| is_refused || self.is_on_part(start))
+=======
+                            let is_risk = matches!(reason, OutcomeReason::Risk { .. });
+                            Some(reason).filter(|_| status == MotionStatus::Refused || is_risk)
+>>>>>>> repW
                         }
                     };
                     let may_be_wedge = || self.may_be_wedge(start, index) && !self.is_drawn_back(start);

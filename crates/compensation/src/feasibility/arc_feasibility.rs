@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
 use crate::plan::reason::OutcomeReason;
-use crate::search_budget::MANY;
+use crate::search_budget::MANY_MOTIONS;
 use crate::segment::curve::{CLOSED_MM, Curve};
 use crate::segment::line::distance;
 use crate::target::solved_target::{SolvedTarget, SolvedTargets};
@@ -36,8 +36,8 @@ const SAMPLES: u8 = 12;
 
 /// A controller takes three points for a circle if circle point and end are at least as far from the start (mm), and seen from it
 /// under at least this angle (rad). Source: ABB, Technical reference manual, RAPID instructions, MoveC, limitations.
-const SHORTEST_MM: f64 = 0.1;
-const NARROWEST_RAD: f64 = std::f64::consts::PI / 180.0;
+const MIN_DISTANCE_MM: f64 = 0.1;
+const MIN_ANGLE_RAD: f64 = std::f64::consts::PI / 180.0;
 
 /// The motions that arcs forbid to correct, by index. `stays`: motions that remain unmodified for reasons other than their
 /// own targets.
@@ -71,7 +71,7 @@ pub(crate) fn infeasible_arcs(
 
 /// The circular motions, by index: few of many.
 fn circular(listing: &Listing) -> Vec<u32> {
-    let motions = listing.motions.par_iter().with_min_len(MANY).enumerate();
+    let motions = listing.motions.par_iter().with_min_len(MANY_MOTIONS).enumerate();
     motions.filter(|(_, motion)| motion.kind == MotionKind::Circular).map(|(index, _)| index as u32).collect()
 }
 
@@ -178,7 +178,7 @@ fn stops(motion: &Motion, before: &[Pose; 3], after: &[Pose; 3]) -> bool {
 /// Whether three points are far enough from each other and from a line for a controller.
 fn makes_circle([from, via, to]: &[Pose; 3]) -> bool {
     let [via, to] = [via, to].map(|point| point.translation.vector - from.translation.vector);
-    via.norm() >= SHORTEST_MM && to.norm() >= SHORTEST_MM && via.angle(&to) >= NARROWEST_RAD
+    via.norm() >= MIN_DISTANCE_MM && to.norm() >= MIN_DISTANCE_MM && via.angle(&to) >= MIN_ANGLE_RAD
 }
 
 /// Whether the controller stops at an unmodified arc if only its start is corrected.

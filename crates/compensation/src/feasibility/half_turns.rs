@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::arc_feasibility::is_corrected;
 use crate::options::Options;
 use crate::plan::reason::OutcomeReason;
-use crate::search_budget::MANY;
+use crate::search_budget::MANY_MOTIONS;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_programs::motion::{Listing, MotionKind, Switch};
 
@@ -29,7 +29,7 @@ pub(crate) fn half_turns(
 ) -> BTreeMap<u32, OutcomeReason> {
     let turned: Vec<(u32, Vec<u32>)> = (0..listing.motions.len() as u32)
         .into_par_iter()
-        .with_min_len(MANY)
+        .with_min_len(MANY_MOTIONS)
         .map(|index| (index, turned_ends(index, listing, solved, options, unchanged_motions)))
         .filter(|(_, ends)| !ends.is_empty())
         .collect();

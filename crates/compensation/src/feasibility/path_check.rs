@@ -23,10 +23,10 @@ const MARGIN_RATE: f64 = 3.0;
 /// Margins of shoulder, elbow and wrist beyond which joints move at most a few times as far as elsewhere.
 const CLEAR_MARGIN: [f64; 3] = [0.05, 0.12, 0.15];
 
-/// Shortest piece of a segment (half arm lengths and rad), together with [`FINEST_SHARE`] of its smallest margin.
-const FINEST: f64 = 3e-4;
-/// See [`FINEST`]: the joints sweep within about the margin itself.
-const FINEST_SHARE: f64 = 0.2;
+/// Shortest piece of a segment (half arm lengths and rad), together with [`MIN_PIECE_SHARE`] of its smallest margin.
+const MIN_PIECE: f64 = 3e-4;
+/// See [`MIN_PIECE`]: the joints sweep within about the margin itself.
+const MIN_PIECE_SHARE: f64 = 0.2;
 
 /// Ratio of a branch margin to the singularity distance.
 const WITHOUT_BRANCHES: f64 = 5.0;
@@ -94,7 +94,7 @@ impl PathCheck<'_> {
         let least = a.margins.iter().chain(&b.margins).fold(f64::INFINITY, |least, m| least.min(m.abs()));
         let crosses = (0..3).any(|k| (a.margins[k] < 0.0) != (b.margins[k] < 0.0));
         let regular = clear(&a.margins, &b.margins, flange_travel)
-            || (!crosses && flange_travel < FINEST_SHARE * least);
+            || (!crosses && flange_travel < MIN_PIECE_SHARE * least);
         let limits = &self.nominal.arm().model.limits;
         let keeps = || {
             joint_limits::within_limits(
@@ -104,7 +104,7 @@ impl PathCheck<'_> {
                 flange_travel,
             )
         };
-        if flange_travel < FINEST || (regular && keeps()) || self.samples.get() == 0 {
+        if flange_travel < MIN_PIECE || (regular && keeps()) || self.samples.get() == 0 {
             return crosses.then_some(OutcomeReason::SingularPath);
         }
         self.samples.set(self.samples.get() - 1);

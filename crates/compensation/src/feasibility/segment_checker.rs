@@ -27,7 +27,7 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, Switch, TargetValue};
 
 /// Most samples of one segment.
-const MOST_SAMPLES: usize = 400;
+const MAX_SAMPLES: usize = 400;
 
 /// Margin below which an unknown start decides between two branches.
 const BORDER_MARGIN: f64 = 0.05;
@@ -93,12 +93,11 @@ impl SegmentChecker<'_, '_> {
             let whole = SearchBudget::of(search_budget::WAYS);
             let found = search_budget::shared_out(
                 whole,
-                suspects.len().div_ceil(search_budget::PORTION),
-                |portion, budget| {
+                suspects.len().div_ceil(search_budget::CHUNK),
+                |chunk, budget| {
                     let segment_fault =
                         |motion: &usize| Some((*motion, here.segment_fault(*motion, samples, budget)?));
-                    let mine =
-                        suspects.iter().skip(portion * search_budget::PORTION).take(search_budget::PORTION);
+                    let mine = suspects.iter().skip(chunk * search_budget::CHUNK).take(search_budget::CHUNK);
                     mine.filter_map(segment_fault).collect::<Vec<_>>()
                 },
             );
@@ -113,7 +112,7 @@ impl SegmentChecker<'_, '_> {
     /// Samples per segment for so many suspects.
     fn samples(&self, suspects: usize) -> usize {
         let all = SAMPLES.max(SAMPLES_EACH * self.listing.motions.len());
-        (all / suspects.max(1)).clamp(1, MOST_SAMPLES)
+        (all / suspects.max(1)).clamp(1, MAX_SAMPLES)
     }
 
     /// Checks, in order, motions that start at an unmodified one; returns whether any is forbidden.
@@ -171,7 +170,7 @@ impl SegmentChecker<'_, '_> {
     /// For each motion, whether nothing can be wrong with it as long as every motion before it is corrected: its configuration is
     /// checked, and it is corrected itself.
     fn quiet(&self) -> Vec<bool> {
-        let motions = self.listing.motions.par_iter().with_min_len(search_budget::MANY).enumerate();
+        let motions = self.listing.motions.par_iter().with_min_len(search_budget::MANY_MOTIONS).enumerate();
         let quiet = |(index, motion): (usize, &Motion)| {
             monitored(motion) == Switch::On
                 && self.corrected(index).is_some()
@@ -352,7 +351,7 @@ impl SegmentChecker<'_, '_> {
         }
         let left = Cell::new(samples);
         let found = with_budget(budget, || self.segment_fault_within(index, &left));
-        let unfinished = budget.exhausted || (left.get() == 0 && samples < MOST_SAMPLES);
+        let unfinished = budget.exhausted || (left.get() == 0 && samples < MAX_SAMPLES);
         if unfinished { Some(OutcomeReason::Inverse(InverseError::Abandoned)) } else { found }
     }
 

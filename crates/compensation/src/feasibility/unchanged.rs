@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::arms::Arms;
 use crate::cut::{self, Cuts, CutsOf};
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::feasibility::approaches::{Shift, Starts};
 use crate::feasibility::arc_feasibility::infeasible_arcs;
 use crate::feasibility::half_turns::half_turns;
@@ -35,8 +35,14 @@ pub(crate) fn unchanged_motions(
     // For segments that start where another motion remains unmodified, over all rounds.
     let mut budget = SearchBudget::of(search_budget::WAYS);
     let mut forbidden = forbid_segments(listing, solved, frame_table, arms, options, None, &mut budget);
+<<<<<<< HEAD
     let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
     let has_starts = options.cuts != Cuts::Single;
+=======
+    let mut rounds = (MAX_VISITS / listing.motions.len().max(1)).clamp(MIN_ROUNDS, MAX_ROUNDS);
+    // Lines of NC programs have no stops, and their air moves are judged once they are written.
+    let has_starts = !listing.numbered && options.cuts != Cuts::Single;
+>>>>>>> repW
     let starts = has_starts.then(|| Starts::of(listing, cuts, options.cuts == Cuts::Whole));
     loop {
         let before = out.len();
@@ -91,11 +97,11 @@ pub(crate) fn unchanged_motions(
 }
 
 /// Motions visited over all rounds.
-const MOST_VISITS: usize = 4_000_000;
+const MAX_VISITS: usize = 4_000_000;
 /// Smallest number of rounds.
-const FEWEST_ROUNDS: usize = 16;
+const MIN_ROUNDS: usize = 16;
 /// Largest number of rounds: otherwise cut after cut could be pinned, each by the previous one.
-const MOST_ROUNDS: usize = 1000;
+const MAX_ROUNDS: usize = 1000;
 const ABANDONED: OutcomeReason = OutcomeReason::Inverse(InverseError::Abandoned);
 
 /// Why a motion remains unmodified: first what the text leaves open, then what no arm reaches; `None` where it is corrected.
@@ -105,7 +111,7 @@ pub(crate) fn blocking_reason(
     solved: &SolvedTargets<'_>,
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
-) -> Option<(Status, OutcomeReason)> {
+) -> Option<(MotionStatus, OutcomeReason)> {
     let motion = &listing.motions[index as usize];
     if let Some(reason) = motion.own_reason.map(OutcomeReason::Program) {
         return Some((unchanged(reason), reason));
@@ -117,21 +123,24 @@ pub(crate) fn blocking_reason(
         return Some((unchanged(reason), reason));
     }
     if targets.is_empty() {
-        return Some((Status::Left, OutcomeReason::Program(Reason::ExternalOnly)));
+        return Some((MotionStatus::Left, OutcomeReason::Program(Reason::ExternalOnly)));
     }
     if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
-        return Some((Status::Left, OutcomeReason::JointTarget));
+        return Some((MotionStatus::Left, OutcomeReason::JointTarget));
     }
     let forbidden = targets.iter().find_map(|target| target.as_ref().ok()?.forbidden.as_deref().copied());
     let reason = forbidden.or_else(|| unchanged_motions.get(&index).copied())?;
-    Some((if matches!(reason, OutcomeReason::Risk { .. }) { Status::Left } else { Status::Refused }, reason))
+    Some((
+        if matches!(reason, OutcomeReason::Risk { .. }) { MotionStatus::Left } else { MotionStatus::Refused },
+        reason,
+    ))
 }
 
 /// Status of an unmodified motion: left where the text states too little, refused where what it states is impossible.
-fn unchanged(reason: OutcomeReason) -> Status {
+fn unchanged(reason: OutcomeReason) -> MotionStatus {
     match reason {
-        OutcomeReason::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,
-        OutcomeReason::Program(_) => Status::Left,
-        _ => Status::Refused,
+        OutcomeReason::Program(Reason::BeyondReach | Reason::NumberRange) => MotionStatus::Refused,
+        OutcomeReason::Program(_) => MotionStatus::Left,
+        _ => MotionStatus::Refused,
     }
 }

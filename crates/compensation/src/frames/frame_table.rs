@@ -147,7 +147,7 @@ impl FrameTable {
             values.any(|value| *value.external() != [OptionF64::NONE; 6])
         };
         // Hardly any program has external axes.
-        let any = listing.motions.par_iter().with_min_len(search_budget::MANY).any(stated);
+        let any = listing.motions.par_iter().with_min_len(search_budget::MANY_MOTIONS).any(stated);
         for motion in listing.motions.iter().filter(|_| any) {
             let values = motion.targets.iter().filter_map(|target| target.value.as_ref().ok());
             for target in values {

@@ -61,7 +61,7 @@ impl<'a> KnownTools<'a> {
 }
 
 /// Most names listed in a sentence.
-pub(crate) const MOST_NAMES: usize = 12;
+pub(crate) const MAX_NAMES: usize = 12;
 
 impl KnownTool<'_> {
     pub(crate) fn is(&self, name: &str) -> bool {

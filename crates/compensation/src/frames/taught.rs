@@ -16,7 +16,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::cell::{Cell, CellFrame, CellLookup, FrameKind, FrameOrigin, Teaches};
 use crate::condition::payload::is_load_dependent;
-use crate::frames::known_tools::{KnownTool, KnownTools, MOST_NAMES};
+use crate::frames::known_tools::{KnownTool, KnownTools, MAX_NAMES};
 use crate::frames::teaching_geometry::{
     FixedPoint, explained, fixed_point, frame_of, half_step_rad, radians, rounded, touched,
 };
@@ -442,8 +442,8 @@ impl<'a> Teaching<'a> {
                         ));
                     }
                     _ => {
-                        let names = fitting.iter().map(|known| known.name.as_str()).take(MOST_NAMES);
-                        let more = match fitting.len().saturating_sub(MOST_NAMES) {
+                        let names = fitting.iter().map(|known| known.name.as_str()).take(MAX_NAMES);
+                        let more = match fitting.len().saturating_sub(MAX_NAMES) {
                             0 => String::new(),
                             more => format!(" and {more} more"),
                         };

@@ -10,9 +10,9 @@ pub(crate) const WRITTEN_TOLERANCE: FrameDistance =
     FrameDistance { mm: 0.1, rad: 0.02 * std::f64::consts::PI / 180.0 };
 /// A programmed frame farther away than this does not belong to the teaching joints, however coarsely they are rounded (mm,
 /// rad).
-const MOST: FrameDistance = FrameDistance { mm: 5.0, rad: std::f64::consts::PI / 180.0 };
+const MAX_FRAME_DISTANCE: FrameDistance = FrameDistance { mm: 5.0, rad: std::f64::consts::PI / 180.0 };
 /// Controllers show joint angles with at least two decimals (°): coarser ones are not taken as rounded.
-const COARSEST_DEG: f64 = 0.01;
+const MAX_JOINT_STEP_DEG: f64 = 0.01;
 /// Poses are too much alike if their orientations determine the TCP less well than this (smallest singular value).
 const ALIKE: f64 = 1e-3;
 
@@ -155,7 +155,7 @@ pub(crate) fn half_step_rad(deg: &[[f64; 6]]) -> f64 {
         text.split_once('.').map_or(0, |(_, decimals)| decimals.len())
     };
     let most = deg.iter().flatten().map(decimals).max().unwrap_or(0);
-    0.5 * 10f64.powi(-(most as i32)).min(COARSEST_DEG).to_radians()
+    0.5 * 10f64.powi(-(most as i32)).min(MAX_JOINT_STEP_DEG).to_radians()
 }
 
 /// Largest displacement of a frame computed from rounded joints: each of them off by half its last decimal, all in the worst
@@ -184,8 +184,8 @@ pub(crate) fn rounded(
 /// Difference that is explained by written decimals, rounded joints and `scatter_mm`.
 pub(crate) fn explained(rounded: FrameDistance, scatter_mm: f64) -> FrameDistance {
     FrameDistance {
-        mm: (WRITTEN_TOLERANCE.mm + rounded.mm + scatter_mm).min(MOST.mm),
-        rad: (WRITTEN_TOLERANCE.rad + rounded.rad).min(MOST.rad),
+        mm: (WRITTEN_TOLERANCE.mm + rounded.mm + scatter_mm).min(MAX_FRAME_DISTANCE.mm),
+        rad: (WRITTEN_TOLERANCE.rad + rounded.rad).min(MAX_FRAME_DISTANCE.rad),
     }
 }
 

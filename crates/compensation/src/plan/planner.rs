@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use crate::arms::Arms;
 use crate::configuration::monitored;
 use crate::cut::StartsOf;
-use crate::deviation::{PathPoint, Status};
+use crate::deviation::{MotionStatus, PathPoint};
 use crate::feasibility::unchanged::blocking_reason;
 use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
@@ -52,24 +52,24 @@ pub(super) fn planned(job: &Planner<'_>) -> Plan {
     let Planner { listing, solved, frame_table, arms, options, .. } = *job;
     let count = listing.motions.len();
     let whole = SearchBudget::of(search_budget::PATHS).with_near_solves(search_budget::path_steps(count));
-    // Filled in place: concatenating per-portion lists would hold everything twice.
-    let motions = (0..count as u32).into_par_iter().with_min_len(search_budget::MANY);
+    // Filled in place: concatenating per-chunk lists would hold everything twice.
+    let motions = (0..count as u32).into_par_iter().with_min_len(search_budget::MANY_MOTIONS);
     let mut outcomes: Vec<MotionOutcome> = motions.clone().map(MotionOutcome::left).collect();
     let mut changes: Vec<Option<Change>> = motions.map(|_| None).collect();
     let mut slots: Vec<OutputSlots<'_>> =
-        outcomes.chunks_mut(search_budget::PORTION).zip(changes.chunks_mut(search_budget::PORTION)).collect();
-    let portions: Vec<PortionResult> =
-        search_budget::shared_out_into(whole, &mut slots, |portion, slots, budget| {
-            let first = portion * search_budget::PORTION;
-            job.portion(first..(first + search_budget::PORTION).min(count), slots, budget)
+        outcomes.chunks_mut(search_budget::CHUNK).zip(changes.chunks_mut(search_budget::CHUNK)).collect();
+    let chunks: Vec<ChunkResult> =
+        search_budget::shared_out_into(whole, &mut slots, |chunk, slots, budget| {
+            let first = chunk * search_budget::CHUNK;
+            job.chunk(first..(first + search_budget::CHUNK).min(count), slots, budget)
         });
     let mut notes = frame_table.notes();
     notes.extend(backlash_note(arms, solved));
     notes.extend(doubtful_effects_note(arms));
     notes.extend(load_notes(listing, arms, options));
-    let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
+    let unchecked: Vec<u32> = chunks.iter().flat_map(|chunk| chunk.unchecked.iter().copied()).collect();
     notes.extend(unchecked_notes(listing, solved, &unchecked));
-    let from_several: Vec<u32> = portions.iter().flat_map(|portion| &portion.from_several).copied().collect();
+    let from_several: Vec<u32> = chunks.iter().flat_map(|chunk| &chunk.from_several).copied().collect();
     notes.extend(several_starts_note(listing, &from_several));
     notes.extend(beyond_noise_note(arms, outcomes.iter().filter_map(|outcome| outcome.shape_sigma_mm.get())));
     #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
@@ -77,9 +77,9 @@ pub(super) fn planned(job: &Planner<'_>) -> Plan {
     let unstated_axes = frame_table.unstated_axes.clone();
     let unknown_loads = unknown_loads(arms, options, &outcomes);
     let mut plan = Plan { notes, changes, outcomes, unstated_axes, unknown_loads, ..Plan::default() };
-    plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
-    for mut portion in portions {
-        plan.points.append(&mut portion.points);
+    plan.points.reserve_exact(chunks.iter().map(|p| p.points.len()).sum());
+    for mut chunk in chunks {
+        plan.points.append(&mut chunk.points);
     }
     plan.points.iter_mut().enumerate().for_each(|(index, point)| point.index = index);
     plan
@@ -105,8 +105,8 @@ pub(super) struct Planner<'a> {
 /// Output slots of consecutive motions.
 type OutputSlots<'p> = (&'p mut [MotionOutcome], &'p mut [Option<Change>]);
 
-/// Remaining results of a portion.
-struct PortionResult {
+/// Remaining results of a chunk.
+struct ChunkResult {
     /// Lines and arcs that are written although their path was not checked.
     unchecked: Vec<u32>,
     /// Lines and arcs that may start at several places, from each of which their path was checked.
@@ -155,27 +155,27 @@ impl PlannedMotion {
 
     /// Flags a motion that is written without a flag.
     fn flag_if_changed(&mut self, why: OutcomeReason) {
-        if self.outcome.status == Status::Changed {
+        if self.outcome.status == MotionStatus::Changed {
             self.flag(why);
         }
     }
 
     /// Flags a motion that is written.
     fn flag(&mut self, why: OutcomeReason) {
-        (self.outcome.status, self.outcome.reason) = (Status::Flagged, Some(Box::new(why)));
+        (self.outcome.status, self.outcome.reason) = (MotionStatus::Flagged, Some(Box::new(why)));
         if let Some(point) = &mut self.point {
-            (point.status, point.reason) = (Status::Flagged, Some(why.to_string()));
+            (point.status, point.reason) = (MotionStatus::Flagged, Some(why.to_string()));
         }
     }
 }
 
 impl<'a> Planner<'a> {
-    fn portion(
+    fn chunk(
         &self,
         motions: std::ops::Range<usize>,
         (outcomes, changes): &mut OutputSlots<'_>,
         budget: &mut SearchBudget,
-    ) -> PortionResult {
+    ) -> ChunkResult {
         reserve_memory();
         let count = motions.len();
         let paths: Vec<Option<Segment<'a>>> = motions.clone().map(|index| self.path(index)).collect();
@@ -191,7 +191,7 @@ impl<'a> Planner<'a> {
         let mut middles = middles.into_iter();
         // Segment plan of the previous motion, needed for the corner.
         let mut last: Option<(u32, SegmentPlan)> = None;
-        let mut out = PortionResult {
+        let mut out = ChunkResult {
             unchecked: Vec::new(),
             from_several: Vec::new(),
             points: Vec::with_capacity(if self.options.points { count } else { 0 }),
@@ -431,7 +431,7 @@ fn plan_motion<'a>(
     let motion = &listing.motions[index];
     let mut outcome = MotionOutcome::left(index as u32);
     let finish = |mut outcome: MotionOutcome,
-                  status: Status,
+                  status: MotionStatus,
                   reason: Option<OutcomeReason>,
                   change,
                   point: Option<Box<PathPoint>>| {
@@ -498,7 +498,7 @@ fn plan_motion<'a>(
     let new_targets = motion.targets.iter().zip(solved_targets()).map(new).collect();
     outcome.after_mm = largest_mm(targets, 1).into();
     let change = Change { motion: index as u32, targets: new_targets, before: segment_plan.before.clone() };
-    let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
+    let status = if flag.is_some() { MotionStatus::Flagged } else { MotionStatus::Changed };
     PlannedMotion { segment_plan: Some(segment_plan), ..finish(outcome, status, flag, Some(change), point) }
 }
 
@@ -608,7 +608,7 @@ fn path_point(
         sigma_mm: Some(of_shape.unwrap_or(solved.sigma_mm)),
         shape_sigma_mm,
         outside: solved.outside.as_deref().copied(),
-        status: Status::Changed,
+        status: MotionStatus::Changed,
         reason: None,
     }
 }

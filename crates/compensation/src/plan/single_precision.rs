@@ -18,11 +18,11 @@ pub struct SinglePrecision {
 }
 
 /// Changes per parallel work item.
-const PORTION: usize = 4096;
+const CHUNK: usize = 4096;
 
 /// The maximum over all new targets; `None` without any.
 pub fn single_precision(changes: &[Change]) -> Option<SinglePrecision> {
-    let most = changes.par_chunks(PORTION).map(|changes| {
+    let most = changes.par_chunks(CHUNK).map(|changes| {
         let targets = changes
             .iter()
             .flat_map(|change| change.targets.iter().chain(change.before.iter().map(|extra| &extra.target)));

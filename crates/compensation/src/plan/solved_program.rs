@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use crate::arms::Arms;
 use crate::cell::Cell;
 use crate::cut::{self, Cuts, CutsOf, StartsOf};
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::feasibility::joint_lines::lines_off_as_joints;
 use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
 use crate::frames::frame_table::FrameTable;
@@ -32,10 +32,10 @@ use truegrind_programs::motion::{Listing, MotionKind};
 use crate::plan::planner::{Planner, planned};
 
 /// Largest number of rounds in which lines are refused that joints do not follow.
-const MOST_LINE_ROUNDS: usize = 16;
+const MAX_LINE_ROUNDS: usize = 16;
 
 /// Largest number of rounds in which unmodified motions change the backlash sides of later ones.
-const MOST_UNCHANGED_ROUNDS: usize = 64;
+const MAX_UNCHANGED_ROUNDS: usize = 64;
 
 /// Plans the rewrite of a program.
 ///
@@ -106,7 +106,7 @@ impl<'a> SolvedProgram<'a> {
     pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
         let mut refused = refused.clone();
         // A line that joints do not follow is known only with its inserted targets; refusing it may change what lies behind it.
-        for _ in 0..MOST_LINE_ROUNDS {
+        for _ in 0..MAX_LINE_ROUNDS {
             let plan = self.plan_without(&refused);
             let off = lines_off_as_joints(self.listing, &plan, self.options);
             if off.is_empty() {
@@ -173,7 +173,7 @@ impl<'a> SolvedProgram<'a> {
         for (motion, why) in assessment.risky() {
             refused.entry(motion).or_insert(why);
         }
-        for _ in 0..MOST_UNCHANGED_ROUNDS {
+        for _ in 0..MAX_UNCHANGED_ROUNDS {
             if let Some(program) = program
                 && refused != *solved_unchanged
             {
@@ -191,7 +191,7 @@ impl<'a> SolvedProgram<'a> {
                 .filter(|motion| !solved.of(*motion as usize).is_empty())
                 .filter(|motion| solved.of(*motion as usize).iter().all(Result::is_ok))
                 .filter_map(|motion| match blocking_reason(motion, listing, solved, options, &unchanged) {
-                    Some((Status::Refused, why)) => Some((motion, why)),
+                    Some((MotionStatus::Refused, why)) => Some((motion, why)),
                     _ => None,
                 })
                 .collect();

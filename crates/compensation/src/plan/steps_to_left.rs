@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::reason::OutcomeReason;
 use crate::cut::{follows_position, starts};
-use crate::deviation::Status;
+use crate::deviation::MotionStatus;
 use crate::line_list::lines_of;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason, TargetValue};
 use truegrind_programs::rewrite::{Change, NewTarget};
@@ -28,13 +28,13 @@ impl StepsToLeft {
     pub fn of(
         listing: &Listing,
         changes: &[Change],
-        outcome: &dyn Fn(usize) -> (Status, Option<OutcomeReason>, Option<f64>),
+        outcome: &dyn Fn(usize) -> (MotionStatus, Option<OutcomeReason>, Option<f64>),
         tolerance_mm: f64,
     ) -> Option<Self> {
         let left = |index: usize| {
             let (status, reason, _) = outcome(index);
             let motion = &listing.motions[index];
-            status == Status::Left
+            status == MotionStatus::Left
                 && reason != Some(OutcomeReason::NoChange)
                 && (is_path(motion) || is_call(motion))
                 && !follows_position(motion)
@@ -60,7 +60,7 @@ impl StepsToLeft {
         let starts_left = |index: u32, of: &dyn Fn(&Motion, Option<OutcomeReason>) -> bool| {
             starts(listing, index).into_iter().any(|start| {
                 let (status, reason, _) = outcome(start as usize);
-                let is_left = status == Status::Left && reason != Some(OutcomeReason::NoChange);
+                let is_left = status == MotionStatus::Left && reason != Some(OutcomeReason::NoChange);
                 is_left && of(&listing.motions[start as usize], reason)
             })
         };

@@ -22,7 +22,7 @@ use crate::risk::placement::{
 use crate::risk::probability::probability_of_harm;
 use crate::risk::registration::Registration;
 use crate::risk::remedy_search::{self, UnknownPlacement};
-use crate::search_budget::MANY;
+use crate::search_budget::MANY_MOTIONS;
 use truegrind_arm::estimated::{CarriedFrame, Estimated, PosteriorComponent, RegisteredFrame};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::Listing;
@@ -121,7 +121,7 @@ impl AssessmentSample {
         part_of: Vec<u32>,
         reached: impl Fn(usize) -> bool + Sync,
     ) -> Self {
-        let motions = listing.motions.par_iter().with_min_len(MANY).enumerate();
+        let motions = listing.motions.par_iter().with_min_len(MANY_MOTIONS).enumerate();
         let objects: Vec<Option<u32>> =
             motions.map(|(index, motion)| motion.work_object.filter(|_| reached(index))).collect();
         let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
@@ -136,7 +136,7 @@ impl AssessmentSample {
         }
         // Air moves do not count where there are cuts.
         let objects = of_object.into_iter().map(|(object, [cuts, rest])| {
-            (object, evenly_spaced(if cuts.is_empty() { &rest } else { &cuts }, placement::MOST_POINTS))
+            (object, evenly_spaced(if cuts.is_empty() { &rest } else { &cuts }, placement::MAX_POINTS))
         });
         // Where a motion begins a cut: the end of one before it that is not part of the cut.
         let begin = |(root, index): (u32, u32)| {
@@ -151,7 +151,7 @@ impl AssessmentSample {
             let begins = cut.iter().copied().filter_map(begin);
             let commanded: Vec<u32> =
                 begins.chain(all.iter().copied()).filter(|m| reached(*m as usize)).collect();
-            (!commanded.is_empty()).then(|| (all, evenly_spaced(&commanded, cut_risk::MOST_POINTS)))
+            (!commanded.is_empty()).then(|| (all, evenly_spaced(&commanded, cut_risk::MAX_POINTS)))
         });
         Self { objects: objects.collect(), cuts: cuts.collect(), part_of }
     }

@@ -68,7 +68,7 @@ impl UnseenShare {
 }
 
 /// Most points by which a cut is assessed.
-pub(crate) const MOST_POINTS: usize = 32;
+pub(crate) const MAX_POINTS: usize = 32;
 
 /// The best registration of the path over a part, the reference of its shape.
 pub(crate) struct PartRegistration<'r> {

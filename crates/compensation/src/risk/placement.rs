@@ -202,7 +202,7 @@ pub(crate) fn accepts_position(
 }
 
 /// Most sampled targets of a work object.
-pub(crate) const MOST_POINTS: usize = 200;
+pub(crate) const MAX_POINTS: usize = 200;
 
 /// At most `most` of `items`, evenly spaced, in order.
 pub(crate) fn evenly_spaced<T: Copy>(items: &[T], most: usize) -> Vec<T> {

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Point3, Vector3, Vector6};
 use truegrind_math::se3::Pose;
 
 /// Paths narrower than this determine no rotation about themselves (mm).
-const LEAST_LEVER_MM: f64 = 1.0;
+const MIN_LEVER_MM: f64 = 1.0;
 
 /// Points relative to their centroid.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +34,7 @@ impl Registration {
         let levers: Vec<Vector3<f64>> = points.iter().map(|p| p - centre).collect();
         let inertia: Matrix3<f64> =
             levers.iter().map(|r| Matrix3::identity() * r.norm_squared() - r * r.transpose()).sum();
-        let held = inertia + Matrix3::identity() * (count * LEAST_LEVER_MM * LEAST_LEVER_MM);
+        let held = inertia + Matrix3::identity() * (count * MIN_LEVER_MM * MIN_LEVER_MM);
         let turning = held.try_inverse().filter(|m| m.iter().all(|v| v.is_finite()))?;
         Some(Self { centre, levers, inertia, turning })
     }

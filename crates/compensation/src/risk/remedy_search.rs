@@ -34,7 +34,7 @@ const TOUCH_KNOWN_MM: f64 = 0.05;
 /// Standard deviation of a reading where the model does not state it (mm).
 const READING_MM: f64 = 0.05;
 /// Smallest standard deviation of any sensor (mm).
-const FINEST_MM: f64 = 1e-3;
+const MIN_SENSOR_SIGMA_MM: f64 = 1e-3;
 /// Distance of a tracker from the base; distance of a cable outlet relative to that of the outermost target.
 const TRACKER_MM: f64 = 2500.0;
 const OUTLET_FARTHER: f64 = 1.6;
@@ -301,7 +301,7 @@ impl UnknownPlacement<'_, '_> {
         let rmse = self.knowledge.calibrated.held_out.rmse;
         let coordinates: f64 = if self.knowledge.provenance.sensor == Sensor::Cable { 1.0 } else { 3.0 };
         let sigma = rmse / coordinates.sqrt();
-        if sigma > 0.0 && sigma.is_finite() { sigma.max(FINEST_MM) } else { READING_MM }
+        if sigma > 0.0 && sigma.is_finite() { sigma.max(MIN_SENSOR_SIGMA_MM) } else { READING_MM }
     }
 
     /// Information of one measurement on the arm's parameters; `stated`: whether the sensor frame is stated.

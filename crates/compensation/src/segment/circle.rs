@@ -96,11 +96,11 @@ impl Circle {
         let arc = self.intended.arc()?;
         // Most of the tolerance is available to the chords; the arm's own deviation is small.
         let sagitta = (0.8 * options.tolerance_mm / arc.radius).min(1.0);
-        let largest_rad = (2.0 * (1.0 - sagitta).acos()).min(LARGEST_PIECE_RAD);
-        let turn_pieces = (self.intended.turn_rad() / LARGEST_PIECE_RAD).ceil();
+        let largest_rad = (2.0 * (1.0 - sagitta).acos()).min(MAX_PIECE_RAD);
+        let turn_pieces = (self.intended.turn_rad() / MAX_PIECE_RAD).ceil();
         let mut count = (arc.sweep / largest_rad).ceil().max(turn_pieces).max(1.0);
         for _ in 0..ROUNDS {
-            if count > MOST_PIECES {
+            if count > MAX_PIECES {
                 return None;
             }
             let (extra, left) = self.cut(count as usize, path, arms, options)?;
@@ -180,10 +180,10 @@ impl Circle {
 const SAMPLES: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Largest angle of one chord, whatever the tolerance (rad): beyond it, the tool would visibly turn in corners.
-const LARGEST_PIECE_RAD: f64 = std::f64::consts::PI / 12.0;
+const MAX_PIECE_RAD: f64 = std::f64::consts::PI / 12.0;
 
 /// How often the number of chords is increased by half.
 const ROUNDS: usize = 8;
 
 /// A circle is not replaced by more chords than this.
-const MOST_PIECES: f64 = 2000.0;
+const MAX_PIECES: f64 = 2000.0;

@@ -17,11 +17,11 @@ pub(crate) struct ConditionSchedule {
 
 impl ConditionSchedule {
     /// Along a segment with these backlash sides; `condition_index`: that of the sides with the payload there.
-    pub(crate) fn of(course: &BacklashSides, mut condition_index: impl FnMut(JointSides) -> usize) -> Self {
-        let mut turns = course.turns.iter();
+    pub(crate) fn of(sides: &BacklashSides, mut condition_index: impl FnMut(JointSides) -> usize) -> Self {
+        let mut turns = sides.turns.iter();
         let first = turns.next().map(|turn| turn.1);
         let later = turns.map(|(share, sides)| (*share, condition_index(*sides))).collect();
-        Self { first: condition_index(first.unwrap_or(course.end)), later }
+        Self { first: condition_index(first.unwrap_or(sides.end)), later }
     }
 
     pub(crate) fn at(&self, s: f64) -> usize {

@@ -148,7 +148,7 @@ fn originals<'a>(
     // of the listing.
     let mut budget = SearchBudget::of(search_budget::STARTS);
     let monitors: Vec<Switch> =
-        listing.motions.par_iter().with_min_len(search_budget::MANY).map(monitored).collect();
+        listing.motions.par_iter().with_min_len(search_budget::MANY_MOTIONS).map(monitored).collect();
     let chains = chains(listing, &monitors);
     let mut waiting = Vec::new();
     for (at, chain) in chains.iter().enumerate() {
@@ -162,7 +162,7 @@ fn originals<'a>(
     }
     // Chains that begin where the program branches or calls, once the joints at one of the motions before are known: whether those at
     // the others lead to the same is seen below. The chains behind them follow.
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let (mut changed, mut still_waiting) = (false, Vec::new());
         for at in std::mem::take(&mut waiting) {
             let chain = &chains[at];
@@ -200,7 +200,7 @@ fn originals<'a>(
 }
 
 /// Most times that chains wait for the joints before them.
-const MOST_ROUNDS: usize = 16;
+const MAX_ROUNDS: usize = 16;
 
 /// Consecutive motions whose configuration is not monitored, each reached from the one before it.
 fn chains(listing: &Listing, monitors: &[Switch]) -> Vec<Range<usize>> {

@@ -38,10 +38,10 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::load::Load;
 use truegrind_programs::motion::{Listing, MotionKind, RobTarget, Role, Switch, TargetValue};
 
-/// Approximate memory that a portion keeps (bytes).
+/// Approximate memory that a chunk keeps (bytes).
 const KEPT: usize = 100 << 10;
 
-/// Makes the allocator obtain the memory of a portion from the system at once. Otherwise it requests each few thousand bytes
+/// Makes the allocator obtain the memory of a chunk from the system at once. Otherwise it requests each few thousand bytes
 /// separately, and every thread waits meanwhile.
 pub(crate) fn reserve_memory() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(KEPT)));
@@ -78,7 +78,7 @@ struct TargetSolver<'a, 't> {
 const ROUNDS: usize = 4;
 
 /// Largest number of iterations.
-const MOST_ROUNDS: usize = 24;
+const MAX_ROUNDS: usize = 24;
 
 impl<'t> TargetSolver<'_, 't> {
     fn solve(self, arms: &mut Arms<'_>) -> SolvedTargets<'t> {
@@ -104,7 +104,7 @@ impl<'t> TargetSolver<'_, 't> {
         let mut condition_indices = before.clone();
         let mut targets = self.unsolved();
         self.fill(&mut targets, arms, &before, &condition_indices, None);
-        for round in 1..=MOST_ROUNDS {
+        for round in 1..=MAX_ROUNDS {
             let next = self.sides(arms, Some(&targets), &unknown_sides);
             if round > ROUNDS {
                 // A side that still alternates counts as unknown.
@@ -118,7 +118,7 @@ impl<'t> TargetSolver<'_, 't> {
                 break;
             }
             let stale: Vec<bool> = (0..count)
-                .step_by(search_budget::PORTION)
+                .step_by(search_budget::CHUNK)
                 .map(|begin| {
                     let targets = self.targets(begin);
                     new[targets.clone()] != condition_indices[targets]
@@ -127,8 +127,8 @@ impl<'t> TargetSolver<'_, 't> {
             condition_indices = new;
             self.fill(&mut targets, arms, &before, &condition_indices, Some(&stale));
         }
-        let schedules = sides.iter().enumerate().map(|(m, course)| {
-            ConditionSchedule::of(course, |sides| arms.conditions.condition_index(sides, load(m)))
+        let schedules = sides.iter().enumerate().map(|(m, own_sides)| {
+            ConditionSchedule::of(own_sides, |sides| arms.conditions.condition_index(sides, load(m)))
         });
         let schedules = schedules.collect();
         self.solved(targets, schedules)
@@ -164,7 +164,7 @@ impl<'t> TargetSolver<'_, 't> {
         };
         (0..self.listing.motions.len())
             .into_par_iter()
-            .with_min_len(search_budget::MANY)
+            .with_min_len(search_budget::MANY_MOTIONS)
             .filter_map(originals)
             .collect()
     }
@@ -177,13 +177,14 @@ impl<'t> TargetSolver<'_, 't> {
                 .flatten()
                 .any(|original| original.guess == BranchGuess::Guessed)
         };
-        let motions = (0..self.listing.motions.len()).into_par_iter().with_min_len(search_budget::MANY);
+        let motions =
+            (0..self.listing.motions.len()).into_par_iter().with_min_len(search_budget::MANY_MOTIONS);
         motions.filter(guessed).map(|m| m as u32).collect()
     }
 
-    /// The targets of the portion that begins with a motion.
+    /// The targets of the chunk that begins with a motion.
     fn targets(&self, begin: usize) -> std::ops::Range<usize> {
-        self.ranges.of_motions(begin..(begin + search_budget::PORTION).min(self.listing.motions.len()))
+        self.ranges.of_motions(begin..(begin + search_budget::CHUNK).min(self.listing.motions.len()))
     }
 
     /// One slot per target.
@@ -191,7 +192,7 @@ impl<'t> TargetSolver<'_, 't> {
         self.target_refs.par_iter().map(|_| Err(UNSOLVED)).collect()
     }
 
-    /// Solves all targets, or only the `stale` portions; `before`: the conditions of the original program.
+    /// Solves all targets, or only the `stale` chunks; `before`: the conditions of the original program.
     fn fill(
         &self,
         solved: &mut [Result<SolvedTarget<'t>, OutcomeReason>],
@@ -201,23 +202,23 @@ impl<'t> TargetSolver<'_, 't> {
         stale: Option<&[bool]>,
     ) {
         let mut rest = solved;
-        let mut portions: Vec<&mut [Result<SolvedTarget<'t>, OutcomeReason>]> = Vec::new();
-        for begin in (0..self.listing.motions.len()).step_by(search_budget::PORTION) {
+        let mut chunks: Vec<&mut [Result<SolvedTarget<'t>, OutcomeReason>]> = Vec::new();
+        for begin in (0..self.listing.motions.len()).step_by(search_budget::CHUNK) {
             let (here, after) = rest.split_at_mut(self.targets(begin).len());
-            portions.push(here);
+            chunks.push(here);
             rest = after;
         }
         let whole = SearchBudget::of(search_budget::TARGETS);
-        search_budget::shared_out_into(whole, &mut portions, |portion, solved, budget| {
-            if stale.is_some_and(|stale| !stale[portion]) {
+        search_budget::shared_out_into(whole, &mut chunks, |chunk, solved, budget| {
+            if stale.is_some_and(|stale| !stale[chunk]) {
                 return;
             }
             reserve_memory();
-            let targets = self.targets(portion * search_budget::PORTION);
+            let targets = self.targets(chunk * search_budget::CHUNK);
             let condition_indices = [&before[targets.clone()], &condition_indices[targets.clone()]];
             let (target_refs, originals) = (&self.target_refs[targets.clone()], &self.originals[targets]);
             with_budget(budget, || {
-                solve_portion(target_refs, originals, condition_indices, arms, self, solved)
+                solve_chunk(target_refs, originals, condition_indices, arms, self, solved)
             });
         });
     }
@@ -300,11 +301,11 @@ impl<'t> TargetSolver<'_, 't> {
         load: &dyn Fn(usize) -> Option<&'l Load>,
     ) -> Vec<usize> {
         let mut out = Vec::with_capacity(self.target_refs.len());
-        for (m, course) in sides.iter().enumerate() {
+        for (m, own_sides) in sides.iter().enumerate() {
             for target in self.ranges.of_motion(m) {
                 let sides: JointSides = match self.target_refs[target].target.role {
-                    Role::Via => course.via,
-                    Role::To => course.end,
+                    Role::Via => own_sides.via,
+                    Role::To => own_sides.end,
                 };
                 out.push(arms.conditions.condition_index(sides, load(m)));
             }
@@ -316,8 +317,8 @@ impl<'t> TargetSolver<'_, 't> {
 /// What stands for a target that is not solved yet; no target keeps it.
 const UNSOLVED: OutcomeReason = OutcomeReason::JointTarget;
 
-/// Solves one portion of targets into `out`.
-fn solve_portion<'t>(
+/// Solves one chunk of targets into `out`.
+fn solve_chunk<'t>(
     target_refs: &[TargetRef<'t>],
     originals: &[Result<OriginalTarget<'t>, OutcomeReason>],
     condition_indices: [&[usize]; 2],

@@ -34,7 +34,7 @@ const FREE_LEVER: f64 = 0.003;
 const FREE_DEG: f64 = 0.3;
 /// Steps in which the orientation along a way is searched (°), and most of them.
 const TURN_STEP_DEG: f64 = 0.05;
-const MOST_TURN_STEPS: f64 = 4000.0;
+const MAX_TURN_STEPS: f64 = 4000.0;
 /// Targets are the same within this (mm, rad): numbers are written with fewer decimals.
 const SAME_MM: f64 = 1e-3;
 const SAME_RAD: f64 = 1e-5;
@@ -461,7 +461,7 @@ fn least_turn_deg(way: &Curve, pose: &Pose, reached: &[UnitQuaternion<f64>], wit
     let reach = if way.length_mm() > within_mm { within_mm / way.length_mm() } else { 1.0 };
     let [from, to] = [share - reach, share + reach].map(|s| s.clamp(0.0, 1.0));
     let turned_deg = way.turn_rad().to_degrees() * (to - from);
-    let steps = (turned_deg / TURN_STEP_DEG).ceil().clamp(1.0, MOST_TURN_STEPS) as usize;
+    let steps = (turned_deg / TURN_STEP_DEG).ceil().clamp(1.0, MAX_TURN_STEPS) as usize;
     let at = |k: usize| way.at(from + (to - from) * k as f64 / steps as f64).rotation;
     let least = |k: usize| reached.iter().map(|turn| turn.angle_to(&at(k))).fold(f64::INFINITY, f64::min);
     (0..=steps).map(least).fold(f64::INFINITY, f64::min).to_degrees()

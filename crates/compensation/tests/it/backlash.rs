@@ -10,7 +10,7 @@ use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -176,7 +176,12 @@ fn sides_and_loads_of_the_program_leave_nothing_and_the_middle_does() {
         let arm = worn(seed);
         let full = options(5.0, Some(loads.clone()));
         let (planned, program) = rewrite(&text, &arm, &full);
-        assert!(planned.outcomes.iter().all(|o| o.status == Status::Changed || o.status == Status::Flagged));
+        assert!(
+            planned
+                .outcomes
+                .iter()
+                .all(|o| o.status == MotionStatus::Changed || o.status == MotionStatus::Flagged)
+        );
         let right = worst_end(&program, &text, &arm);
         assert!(right < 1e-3, "with sides and loads {right} mm are left");
         // Without sides: mid-play.

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use truegrind_arm::model::Joints;
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::cut::Cuts;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::options::{Circles, Options};
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::solved_program::plan;
@@ -52,7 +52,7 @@ fn a_circle_is_kept_and_its_path_checked() {
     let source = arc_program("", "MoveC");
     let (planned, text) = rewrite(&source, &known(&actual), &Options::default());
     let outcome = &planned.outcomes[1];
-    assert_eq!((outcome.status, outcome.inserted), (Status::Changed, 0), "{outcome:?}");
+    assert_eq!((outcome.status, outcome.inserted), (MotionStatus::Changed, 0), "{outcome:?}");
     assert!(text.contains("MoveC") && text.contains("! over"));
     // The stated deviation is that of an arm that follows the commanded circle.
     let task = Task::read(&[("p.mod", text.as_bytes())]);
@@ -83,7 +83,7 @@ fn a_circle_in_straight_pieces_is_followed_within_the_tolerance_and_smoothly() {
             let known = known(&actual);
             let (planned, text) = rewrite(&source, &known, &options);
             let outcome = &planned.outcomes[1];
-            assert_eq!(outcome.status, Status::Changed, "{outcome:?}");
+            assert_eq!(outcome.status, MotionStatus::Changed, "{outcome:?}");
             assert!(
                 !text.to_uppercase().contains("MOVEC") && text.contains(line) && text.contains("! over"),
                 "{text}"
@@ -124,7 +124,7 @@ fn a_circle_in_straight_pieces_is_followed_within_the_tolerance_and_smoothly() {
             // Each inserted target states the configuration in which it is reached.
             let nothing = estimated(nominal(), &[Joints::zeros()]);
             let again = plan(&task.listing, &nothing, &Cell::default(), &Options::default());
-            assert!(again.outcomes.iter().all(|o| o.status != Status::Refused), "{:?}", again.outcomes);
+            assert!(again.outcomes.iter().all(|o| o.status != MotionStatus::Refused), "{:?}", again.outcomes);
         }
     }
 }
@@ -136,7 +136,7 @@ fn a_circle_that_may_not_be_split_stays_and_is_flagged() {
     let (planned, text) =
         rewrite(&arc_program("", "MoveC").replace("v50,", "v50\\T:=3,"), &known(&actual), &options);
     assert_eq!(planned.outcomes[1].reason(), Some(OutcomeReason::CircleKept));
-    assert_eq!(planned.outcomes[1].status, Status::Flagged);
+    assert_eq!(planned.outcomes[1].status, MotionStatus::Flagged);
     assert!(text.contains("MoveC"));
     // Nor one with an unknown start.
     let alone = module(&format!("  MoveC {},{},v50,z5,tool0;\n", on_circle(-90.0), on_circle(-20.0)));
@@ -298,8 +298,8 @@ fn every_circular_instruction_has_a_straight_form_of_the_same_process() {
     // What is triggered along the whole of a circle would be triggered along its last piece.
     let original = Task::read(&[("p.mod", source.as_bytes())]);
     for (motion, outcome) in original.listing.motions.iter().zip(&planned.outcomes) {
-        let kept = (Status::Flagged, Some(OutcomeReason::CircleKept));
-        let expected = if &*motion.instruction == "TriggC" { kept } else { (Status::Changed, None) };
+        let kept = (MotionStatus::Flagged, Some(OutcomeReason::CircleKept));
+        let expected = if &*motion.instruction == "TriggC" { kept } else { (MotionStatus::Changed, None) };
         assert_eq!((outcome.status, outcome.reason()), expected, "{outcome:?}");
     }
     let task = Task::read(&[("p.mod", text.as_bytes())]);
@@ -326,7 +326,7 @@ fn every_circular_instruction_has_a_straight_form_of_the_same_process() {
         planned.outcomes.iter().map(|o| 1 + o.inserted as usize).sum::<usize>()
     );
     let again = plan(&task.listing, &estimated(nominal(), &[Joints::zeros()]), &Cell::default(), &options);
-    assert!(again.outcomes.iter().all(|o| o.status != Status::Refused), "{:?}", again.outcomes);
+    assert!(again.outcomes.iter().all(|o| o.status != MotionStatus::Refused), "{:?}", again.outcomes);
     assert!(text.contains("DispL [[") && text.contains("ArcLEnd p3,v100,seam1,weld1,fine,tool0;"), "{text}");
 }
 
@@ -356,7 +356,7 @@ fn nc_arcs_helices_and_whole_circles_are_checked_and_become_straight_pieces_when
             let options = Options { circles, tolerance_mm, ..Options::default() };
             let planned = plan(&task.listing, &known, &Cell::default(), &options);
             let outcome = &planned.outcomes[1];
-            assert_eq!(outcome.status, Status::Changed, "{body}: {outcome:?}");
+            assert_eq!(outcome.status, MotionStatus::Changed, "{body}: {outcome:?}");
             assert!(outcome.path_deviation_mm.get().unwrap() <= options.tolerance_mm, "{body}: {outcome:?}");
             assert_eq!(outcome.inserted > 10, circles == Circles::Segments, "{body}: {outcome:?}");
             let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();

@@ -9,7 +9,7 @@ use truegrind_arm::model::Joints;
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::compensate::{Compensated, compensate};
 use truegrind_compensation::cut::Cuts;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::options::{Emit, Options};
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::steps_to_left::StepsToLeft;
@@ -52,11 +52,11 @@ fn done(source: &str, cuts: Cuts, tolerance_mm: f64) -> (Compensated, Vec<u8>) {
     (done, bytes)
 }
 
-fn statuses(done: &Compensated) -> Vec<Status> {
+fn statuses(done: &Compensated) -> Vec<MotionStatus> {
     done.plan.outcomes.iter().map(|outcome| outcome.status).collect()
 }
 
-use Status::{Changed, Flagged, Left, Refused};
+use MotionStatus::{Changed, Flagged, Left, Refused};
 
 #[test]
 fn a_target_that_cannot_be_reached_keeps_its_cut_and_no_other() {
@@ -626,7 +626,7 @@ fn no_random_program_has_a_cut_half_corrected() {
         }
         let (done, _) = done(&module(&body), Cuts::Whole, 0.05);
         let changed: Vec<bool> =
-            statuses(&done).iter().map(|s| matches!(s, Changed | Status::Flagged)).collect();
+            statuses(&done).iter().map(|s| matches!(s, Changed | MotionStatus::Flagged)).collect();
         for k in 1..changed.len() {
             let apart = fine[k - 1] || air[k];
             assert!(apart || changed[k] == changed[k - 1], "seed {seed}, motion {k}: {changed:?}");

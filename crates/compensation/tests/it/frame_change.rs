@@ -6,7 +6,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Joints;
 use truegrind_compensation::cell::Cell;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::solved_program::plan;
 use truegrind_math::se3::Pose;
@@ -140,7 +140,7 @@ fn a_line_behind_a_shift_of_the_frame_is_checked() {
             let loose = Options { tolerance_mm: 5.0, ..Options::default() };
             let planned = plan(&listing, &known, &Cell::default(), &loose);
             let outcome = &planned.outcomes[2];
-            assert_eq!(outcome.status, Status::Changed, "{text}{outcome:?}");
+            assert_eq!(outcome.status, MotionStatus::Changed, "{text}{outcome:?}");
             assert!(!planned.notes.iter().any(|note| note.contains("unknown or not corrected")), "{text}");
             outcome.path_deviation_mm.get().unwrap()
         };

@@ -13,7 +13,7 @@ fn source(first: &str) -> Vec<u8> {
         .into_bytes()
 }
 
-fn planned_as(source: &[u8], emit: Emit) -> Vec<(Status, Option<OutcomeReason>, usize)> {
+fn planned_as(source: &[u8], emit: Emit) -> Vec<(MotionStatus, Option<OutcomeReason>, usize)> {
     let estimated = estimated(perturbed(3, 1.0), &[Joints::zeros()]);
     let options = Options { emit, ..Options::default() };
     let task = Task::read(&[("p.mod", source)]);
@@ -33,7 +33,7 @@ fn a_line_from_an_unknown_start_is_not_written_as_joints() {
     // One cut, left whole: the first line has no start, and the others follow it.
     let joints = planned_as(&from_nowhere, Emit::Joints);
     assert_eq!(joints[0].1, Some(OutcomeReason::LineWithoutStart));
-    assert!(joints.iter().all(|(status, ..)| *status == Status::Refused), "{joints:?}");
+    assert!(joints.iter().all(|(status, ..)| *status == MotionStatus::Refused), "{joints:?}");
     // From a joint motion all lines are split into joint motions.
     let joints = planned_as(&source("MoveJ"), Emit::Joints);
     assert!(joints.iter().all(|(status, ..)| status.is_written()), "{joints:?}");
@@ -60,9 +60,9 @@ fn a_line_that_cannot_be_divided_is_not_written_as_one_joint_motion() {
         let source = with([begin.clone(), line.clone(), back].concat()).into_bytes();
         let found = planned_as(&source, Emit::Joints);
         // Where it begins stays as well.
-        assert_eq!((found[0].0, found[2].0.is_written()), (Status::Refused, true), "{found:?}");
+        assert_eq!((found[0].0, found[2].0.is_written()), (MotionStatus::Refused, true), "{found:?}");
         let Some(OutcomeReason::LineAsJoints { mm }) = found[1].1 else { panic!("{found:?}") };
-        assert!(found[1].0 == Status::Refused && mm > 10.0, "{found:?}");
+        assert!(found[1].0 == MotionStatus::Refused && mm > 10.0, "{found:?}");
         assert!(found[1].1.unwrap().to_string().contains("drop --emit joints"), "{found:?}");
         assert!(planned_as(&source, Emit::Targets)[1].0.is_written(), "{line}");
     }

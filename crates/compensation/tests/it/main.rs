@@ -34,7 +34,7 @@ use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::link_parameters;
 use truegrind_arm::region::Region;
 use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
-use truegrind_compensation::deviation::{After, PathReport, Status};
+use truegrind_compensation::deviation::{After, MotionStatus, PathReport};
 use truegrind_compensation::frames::taught::{taught_frame, taught_tcp};
 use truegrind_compensation::options::{Emit, Options};
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -142,9 +142,9 @@ fn a_perfectly_known_arm_follows_the_blade_to_the_printed_decimals() {
             let options = Options { emit, ..Options::default() };
             let (planned, program) = rewritten(&source, &known, &Cell::default(), &options);
             assert!(
-                planned.outcomes.iter().all(|o| o.status == Status::Changed),
+                planned.outcomes.iter().all(|o| o.status == MotionStatus::Changed),
                 "{:?}",
-                planned.outcomes.iter().find(|o| o.status != Status::Changed)
+                planned.outcomes.iter().find(|o| o.status != MotionStatus::Changed)
             );
             let report = run_on(&actual, &source, &program, &Cell::default());
             assert!(worst(&report, false) > 0.3, "the arm is off before");
@@ -196,7 +196,7 @@ fn a_large_correction_is_refused_and_named() {
     let options = Options { max_correction_mm: 0.01, ..Options::default() };
     let (planned, program) = rewritten(&source, &known, &Cell::default(), &options);
     assert!(program == source, "nothing may be written beyond the bound");
-    assert!(planned.outcomes.iter().all(|o| o.status == Status::Refused));
+    assert!(planned.outcomes.iter().all(|o| o.status == MotionStatus::Refused));
     assert!(
         planned
             .outcomes
@@ -222,7 +222,7 @@ fn a_joint_outside_its_measured_range_is_flagged() {
         .collect();
     let known = estimated(actual, &measured);
     let (planned, _) = rewritten(&source, &known, &Cell::default(), &Options::default());
-    let flagged: Vec<_> = planned.outcomes.iter().filter(|o| o.status == Status::Flagged).collect();
+    let flagged: Vec<_> = planned.outcomes.iter().filter(|o| o.status == MotionStatus::Flagged).collect();
     assert!(!flagged.is_empty());
     let by = flagged
         .iter()
@@ -336,14 +336,14 @@ fn a_line_from_two_known_places_is_judged_by_the_worse_path() {
     let (outcome, notes) = planned(&both, far_mm / 3.0);
     let judged =
         matches!(outcome.reason(), Some(OutcomeReason::PathDeviation { mm }) if (mm - far_mm).abs() < 1e-9);
-    assert!(outcome.status == Status::Flagged && judged && outcome.inserted == 0, "{outcome:?}");
+    assert!(outcome.status == MotionStatus::Flagged && judged && outcome.inserted == 0, "{outcome:?}");
     assert!(
         notes.contains("1 line or arc may start at more than one place")
             && !notes.contains("unknown or not corrected")
     );
     // One of the places is not known.
     let (outcome, notes) = planned(&source(-250.0, "MoveJ Offs(seen,0,0,0),v20,fine,tool0;\n"), far_mm / 3.0);
-    assert_eq!((outcome.path_deviation_mm.get(), outcome.status), (None, Status::Changed));
+    assert_eq!((outcome.path_deviation_mm.get(), outcome.status), (None, MotionStatus::Changed));
     assert!(notes.contains("1 line or arc starts at a place that is unknown or not corrected"), "{notes}");
 }
 

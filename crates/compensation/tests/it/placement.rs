@@ -9,7 +9,7 @@ use truegrind_arm::estimated::{Estimated, EstimatedParameter};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
-use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{MotionStatus, PathPoint, PathReport};
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -460,7 +460,7 @@ fn a_cut_that_would_too_likely_get_worse_is_left_whole_with_that_reason() {
             let outcome = &plan.outcomes[*motion as usize];
             assert_eq!(
                 (outcome.status, outcome.reason()),
-                (Status::Left, Some(OutcomeReason::Risk { chance: cut.probability_of_harm }))
+                (MotionStatus::Left, Some(OutcomeReason::Risk { chance: cut.probability_of_harm }))
             );
             let line = &before[task.listing.motions[*motion as usize].place.line as usize - 1];
             assert!(after.contains(line), "{line}");

@@ -8,7 +8,7 @@ use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::cut::Cuts;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::options::{Circles, Options};
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -216,7 +216,7 @@ fn every_reason_there_is_shows_in_a_program() {
     let mut look = |plan: &Plan| {
         for outcome in &plan.outcomes {
             if let Some(why) = &outcome.reason() {
-                assert_ne!(outcome.status, Status::Changed);
+                assert_ne!(outcome.status, MotionStatus::Changed);
                 assert!(!why.to_string().is_empty());
                 seen.insert(name(why));
             }
@@ -408,7 +408,7 @@ fn where_no_configuration_reaches_a_target_the_reason_is_what_forbids_the_neares
         );
         let planned = planned(source.as_bytes(), &known(), &Cell::default(), &Options::default());
         let outcome = &planned.outcomes[0];
-        assert_eq!(outcome.status, Status::Refused);
+        assert_eq!(outcome.status, MotionStatus::Refused);
         assert!(
             matches!(outcome.reason(), Some(OutcomeReason::OutsideLimits { .. })),
             "{conf} {:?}",

@@ -9,7 +9,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::options::{Circles, Options};
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -176,6 +176,7 @@ fn a_rounded_corner_is_checked_along_its_parabola() {
 #[test]
 fn inserted_targets_keep_clear_of_rounded_corners() {
     let known = known(&perturbed(5, 3.0));
+<<<<<<< HEAD
     let source = |zone: &str| {
         module(&format!(
             "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,{zone},tool0;\n  MoveL {},v100,fine,tool0;\n",
@@ -209,6 +210,24 @@ fn inserted_targets_keep_clear_of_rounded_corners() {
     let sharp = planned("fine", 0.005);
     assert!(sharp.outcomes[1].inserted > 0 && sharp.outcomes[2].inserted > rounded.outcomes[2].inserted);
     assert!(sharp.outcomes.iter().all(|outcome| outcome.status == Status::Changed), "{:?}", sharp.outcomes);
+=======
+    let source = module(&format!(
+        "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,z200,tool0;\n  MoveL {},v100,fine,tool0;\n",
+        down(250.0, -230.0, 320.0),
+        down(420.0, -230.0, 320.0),
+        down(420.0, 230.0, 320.0)
+    ));
+    let (planned, _) = rewrite(&source, &known, &Options { tolerance_mm: 5.0, ..Options::default() });
+    assert_eq!(planned.outcomes[2].reason(), None, "{:?}", planned.outcomes);
+    let (planned, _) = rewrite(&source, &known, &Options { tolerance_mm: 0.005, ..Options::default() });
+    let outcome = &planned.outcomes[2];
+    assert!(outcome.inserted > 0, "{outcome:?}");
+    assert!(
+        matches!(outcome.reason(), Some(OutcomeReason::CornerDeviation { mm }) if mm > 1.0),
+        "{outcome:?}"
+    );
+    assert_eq!(outcome.status, MotionStatus::Flagged);
+>>>>>>> repW
 }
 
 // ---- speed ----
@@ -443,9 +462,9 @@ fn a_line_of_which_the_start_is_not_known_is_flagged() {
         matches!(why, Some(OutcomeReason::PathDeviation { mm }) if (mm - stated).abs() < 1e-9),
         "{why:?}"
     );
-    assert_eq!((tight.outcomes[1].status, tight.outcomes[1].inserted), (Status::Flagged, 0));
+    assert_eq!((tight.outcomes[1].status, tight.outcomes[1].inserted), (MotionStatus::Flagged, 0));
     let (planned, _) = rewrite(&module_with("", &lines), &known, &loose);
-    let statuses: Vec<Status> = planned.outcomes.iter().map(|outcome| outcome.status).collect();
-    assert_eq!(statuses, [Status::Changed, Status::Flagged]);
+    let statuses: Vec<MotionStatus> = planned.outcomes.iter().map(|outcome| outcome.status).collect();
+    assert_eq!(statuses, [MotionStatus::Changed, MotionStatus::Flagged]);
     assert_eq!(planned.outcomes[1].reason(), Some(OutcomeReason::UncheckedPath));
 }

@@ -12,7 +12,7 @@ use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::frames::taught::contradictions;
 use truegrind_compensation::frames::taught::{taught_frame, taught_tcp};
 use truegrind_compensation::options::Options;
@@ -227,7 +227,7 @@ impl IntoPoint for Vector3<f64> {
 fn all_changed(plan: &Plan) {
     let from_unknown = Some(OutcomeReason::UnknownStart);
     assert!(
-        plan.outcomes.iter().all(|o| o.status == Status::Changed || o.reason() == from_unknown),
+        plan.outcomes.iter().all(|o| o.status == MotionStatus::Changed || o.reason() == from_unknown),
         "{:?} {:?}",
         plan.outcomes,
         plan.notes

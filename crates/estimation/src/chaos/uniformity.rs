@@ -93,12 +93,12 @@ pub struct Study {
     /// One entry for each r.
     pub points: Vec<Point>,
     /// Conclusion for the claimed r.
-    pub verdict: Verdict,
+    pub verdict: UniformityVerdict,
 }
 
 /// Whether one r is more uniform than all others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
+pub struct UniformityVerdict {
     /// The r that is claimed to be best.
     pub claimed: f64,
     /// The r with the smallest deviation of the short sequence.
@@ -132,7 +132,7 @@ pub fn study(rs: &[f64], claimed: f64, long_points: usize, options: &Options) ->
     let better = |p: &&Point| p.long.deviation < reference.long.deviation - reference.long.spread;
     let (indistinguishable_short, better_long) =
         (others().filter(near).count(), others().filter(better).count());
-    let verdict = Verdict {
+    let verdict = UniformityVerdict {
         claimed,
         best_short: best(|p| p.short.deviation),
         best_long: best(|p| p.long.deviation),

@@ -10,7 +10,7 @@ use super::words;
 use crate::degradation::{DegradationResult, Outcome, PaperStatement, Run, Strategy};
 use truegrind_math::sentence::capitalised;
 use truegrind_math::statistics::mean_and_deviation;
-use truegrind_report::document::{Block, Document, Verdict};
+use truegrind_report::document::{Block, Document, PageVerdict};
 use truegrind_report::number::Precision;
 use truegrind_report::status::Status;
 use truegrind_report::table::{Cell, Column, Table};
@@ -57,7 +57,7 @@ fn after(j: &Run) -> f64 {
 }
 
 /// Verdict: the causes of a gap between RLS and LM.
-fn verdict(result: &DegradationResult) -> Verdict {
+fn verdict(result: &DegradationResult) -> PageVerdict {
     let mm = |v: f64| Precision::Decimals(4).format(v);
     let mut reasons = Vec::new();
     for count in pose_counts(result) {
@@ -123,7 +123,7 @@ fn verdict(result: &DegradationResult) -> Verdict {
          computing time reflects the same ratio of rows."
             .to_owned(),
     );
-    Verdict::new(Status::Good, format!("{}: {}", capitalised(SIMULATED), headline(result)), reasons)
+    PageVerdict::new(Status::Good, format!("{}: {}", capitalised(SIMULATED), headline(result)), reasons)
 }
 
 /// Errors of RLS and LM with all identification poses of a group.

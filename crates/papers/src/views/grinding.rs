@@ -9,7 +9,7 @@ use crate::verdict::LEVEL;
 use truegrind_calibration::identification::solver::SOLVERS;
 use truegrind_compensation::deviation::{Block as Deviations, PathReport};
 use truegrind_math::statistics::mean_and_deviation;
-use truegrind_report::document::{Block, Document, Verdict};
+use truegrind_report::document::{Block, Document, PageVerdict};
 use truegrind_report::number::Precision;
 use truegrind_report::plot::{Axis, ColorMap, PlanPath, PlanView};
 use truegrind_report::repeated;
@@ -75,7 +75,7 @@ fn held_out(row: &GrindingRow) -> Option<Vec<f64>> {
 }
 
 /// Verdict from one part and several draws of measurements.
-fn verdict(result: &GrindingResult) -> Verdict {
+fn verdict(result: &GrindingResult) -> PageVerdict {
     let mm = |v: f64| Precision::Significant(2).format(v);
     // Partly rewritten programs are not ranked, nor is the model that replaces the arm: its error is zero by definition.
     let mut order: Vec<(&GrindingRow, f64)> = result
@@ -141,7 +141,7 @@ fn verdict(result: &GrindingResult) -> Verdict {
          the methods. The paper's Table 8 has one part and one case."
             .to_owned(),
     );
-    Verdict::new(Status::Good, headline, reasons)
+    PageVerdict::new(Status::Good, headline, reasons)
 }
 
 /// Methods whose deviation on the part differs from the reference's.

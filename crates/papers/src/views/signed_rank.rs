@@ -6,7 +6,7 @@ use super::words;
 use crate::signed_rank::{PairTest, TableResult};
 use crate::statistics::holm;
 use crate::verdict::LEVEL;
-use truegrind_report::document::{Document, Verdict};
+use truegrind_report::document::{Document, PageVerdict};
 use truegrind_report::status::Status;
 use truegrind_report::table::{Cell, Column, Table};
 
@@ -26,7 +26,7 @@ fn is_reproduced(test: &PairTest) -> bool {
 }
 
 /// Whether the printed p values are reproduced, and what they show.
-fn verdict(tables: &[TableResult]) -> Verdict {
+fn verdict(tables: &[TableResult]) -> PageVerdict {
     let all = || tables.iter().flat_map(|t| &t.tests).filter(|t| t.paper_p.is_some());
     let reproduced = all().filter(|t| is_reproduced(t)).count();
     let mut reasons: Vec<String> = Vec::new();
@@ -46,7 +46,7 @@ fn verdict(tables: &[TableResult]) -> Verdict {
         ));
     }
     let status = if reproduced == all().count() { Status::Good } else { Status::Warning };
-    Verdict::new(
+    PageVerdict::new(
         status,
         format!(
             "{reproduced} of {} printed p values are reproduced; they are weaker evidence than they seem",

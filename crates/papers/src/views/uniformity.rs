@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::uniformity::UniformityResult;
-use truegrind_report::document::{Block, Document, Verdict};
+use truegrind_report::document::{Block, Document, PageVerdict};
 use truegrind_report::number::Precision;
 use truegrind_report::plot::{Axis, Graph, Histogram, Reference, Sample, Series};
 use truegrind_report::status::Status;
@@ -108,7 +108,7 @@ fn maps(result: &UniformityResult) -> Table {
     table
 }
 
-fn verdict(result: &UniformityResult) -> Verdict {
+fn verdict(result: &UniformityResult) -> PageVerdict {
     let verdict = &result.study.verdict;
     let claimed = verdict.claimed;
     let headline = if verdict.sampling_noise {
@@ -141,7 +141,7 @@ fn verdict(result: &UniformityResult) -> Verdict {
     reasons.push(
         "This does no harm: a line search over about ten candidates does not need uniform points.".to_owned(),
     );
-    Verdict::new(if verdict.sampling_noise { Status::Warning } else { Status::Good }, headline, reasons)
+    PageVerdict::new(if verdict.sampling_noise { Status::Warning } else { Status::Good }, headline, reasons)
 }
 
 fn over_r(result: &UniformityResult, long: bool) -> String {

@@ -7,7 +7,7 @@ use crate::colour::{BEFORE, FLAGGED, JOINTS, REFUSED, SIGMA, after};
 use crate::curve::{self, Pen, curve};
 use crate::page::{Pane, View};
 use crate::recording::{Store, VisualError};
-use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{After, Deviation, MotionStatus, PathPoint, PathReport};
 
 /// Marks on a curve at most.
 const MARKS: usize = 40;
@@ -68,8 +68,8 @@ fn sigma(store: &mut Store, scene: &PathScene<'_>) -> Result<(), VisualError> {
 /// Flagged and refused points, on the curve of sizes; of very many so few that the curve still shows.
 fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
     for (status, name, colour, shape) in [
-        (Status::Flagged, "flagged", FLAGGED, MarkerShape::Diamond),
-        (Status::Refused, "refused", REFUSED, MarkerShape::Cross),
+        (MotionStatus::Flagged, "flagged", FLAGGED, MarkerShape::Diamond),
+        (MotionStatus::Refused, "refused", REFUSED, MarkerShape::Cross),
     ] {
         let marked = over(plan.first, |p| {
             let at = p.before.or(p.after)?;

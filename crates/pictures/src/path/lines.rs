@@ -9,7 +9,7 @@ use crate::colour::{BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, TOOL, TRAVEL, WORK
 use crate::legend;
 use crate::page::bounds;
 use crate::recording::{Store, VisualError};
-use truegrind_compensation::deviation::{Deviation, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{Deviation, MotionStatus, PathPoint, PathReport};
 
 /// Tool axes that are drawn at most.
 const AXES: usize = 40;
@@ -76,7 +76,7 @@ struct Labels {
 const BESIDE: f64 = 0.55;
 const CHARACTER: f64 = 0.0095;
 /// Farther from the middle a label leaves the view.
-const FARTHEST: f64 = 0.7;
+const MAX_FROM_MIDDLE: f64 = 0.7;
 /// How much a label is lifted, over how far it goes sideways.
 const LIFTED: f64 = 0.8;
 /// Labels are about so long, over the size of the cut.
@@ -94,7 +94,8 @@ impl Labels {
         let beside = (intended(point) - self.middle).try_normalize(1e-9).unwrap_or_else(Vector3::z);
         // Lifted, since a view is wider than high and a label beside the path would end beyond its edge.
         let lifted = |side: Vector3<f64>| (side + LIFTED * Vector3::z()).try_normalize(1e-9).unwrap_or(side);
-        let distance = (BESIDE + CHARACTER * label.chars().count() as f64).min(FARTHEST) * self.size_mm;
+        let distance =
+            (BESIDE + CHARACTER * label.chars().count() as f64).min(MAX_FROM_MIDDLE) * self.size_mm;
         let positions =
             [lifted(beside), lifted(-beside), Vector3::z()].map(|away| self.middle + away * distance);
         let far = |a: &Point3<f64>, b: &Point3<f64>| (a - b).norm() >= LABEL_LENGTH * self.size_mm;
@@ -228,7 +229,7 @@ fn tool_axes(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
 
 fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
     for (status, name, colour) in
-        [(Status::Flagged, "flagged", FLAGGED), (Status::Refused, "refused", REFUSED)]
+        [(MotionStatus::Flagged, "flagged", FLAGGED), (MotionStatus::Refused, "refused", REFUSED)]
     {
         let marked: Vec<&PathPoint> = plan.first.points.iter().filter(|p| p.status == status).collect();
         if marked.is_empty() {

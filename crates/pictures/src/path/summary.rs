@@ -7,7 +7,7 @@ use rerun::TextDocument;
 use super::scene::{PathScene, Plan};
 use crate::markdown::{cell, line, number};
 use crate::recording::{Store, VisualError};
-use truegrind_compensation::deviation::{After, Block, Deviation, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{After, Block, Deviation, MotionStatus, PathPoint, PathReport};
 
 pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<(), VisualError> {
     store.fixed("summary", &TextDocument::from_markdown(markdown(scene, plan)))
@@ -110,18 +110,19 @@ fn meaning(text: &mut String, scene: &PathScene<'_>) {
 
 /// How many points of the first report were changed, left, refused, flagged; and the reasons.
 fn fate(text: &mut String, report: &PathReport) {
-    let count = |s: Status| report.points.iter().filter(|p| p.status == s).count();
+    let count = |s: MotionStatus| report.points.iter().filter(|p| p.status == s).count();
     let _ = writeln!(
         text,
         "Points: {} changed, {} left, {} flagged, {} refused; {} outside the measured region.\n",
-        count(Status::Changed),
-        count(Status::Left),
-        count(Status::Flagged),
-        count(Status::Refused),
+        count(MotionStatus::Changed),
+        count(MotionStatus::Left),
+        count(MotionStatus::Flagged),
+        count(MotionStatus::Refused),
         report.points.iter().filter(|p| p.outside.is_some()).count()
     );
     let mut reasons: Vec<(&PathPoint, usize, bool)> = Vec::new();
-    let marked = report.points.iter().filter(|p| matches!(p.status, Status::Flagged | Status::Refused));
+    let marked =
+        report.points.iter().filter(|p| matches!(p.status, MotionStatus::Flagged | MotionStatus::Refused));
     for point in marked.filter(|p| p.reason.is_some()) {
         match reasons.iter_mut().find(|(known, ..)| known.kind_of_reason() == point.kind_of_reason()) {
             Some((known, n, same)) => (*n, *same) = (*n + 1, *same && known.reason == point.reason),
@@ -160,10 +161,10 @@ fn colours(text: &mut String, scene: &PathScene<'_>, plan: &Plan<'_>) {
         after = if scene.reports.len() > 1 { "other colours" } else { "blue" },
         top = plan.scale.top_mm
     );
-    if plan.first.points.iter().any(|p| p.status == Status::Flagged) {
+    if plan.first.points.iter().any(|p| p.status == MotionStatus::Flagged) {
         text.push_str("- Yellow points: flagged.\n");
     }
-    if plan.first.points.iter().any(|p| p.status == Status::Refused) {
+    if plan.first.points.iter().any(|p| p.status == MotionStatus::Refused) {
         text.push_str("- Purple points: refused.\n");
     }
     let _ = writeln!(

@@ -8,7 +8,7 @@ use rerun::{LineStrips3D, Mesh3D, Points3D, Transform3D};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
-use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{After, Deviation, MotionStatus, PathPoint, PathReport};
 use truegrind_math::se3::Pose;
 use truegrind_pictures::colour::{AFTER, BEFORE, Scale};
 use truegrind_pictures::path::AXIS;
@@ -103,7 +103,7 @@ fn parts(count: usize) -> Parts {
             sigma_mm: Some(0.05),
             shape_sigma_mm: None,
             outside: None,
-            status: Status::Changed,
+            status: MotionStatus::Changed,
             reason: None,
         });
     }
@@ -423,11 +423,11 @@ fn a_label_stands_beside_the_path() {
 fn marked_points_are_labelled_by_line_and_reason_once_for_each_run() {
     let mut parts = scene_parts();
     for index in 20..26 {
-        parts.reports[0].points[index].status = Status::Flagged;
+        parts.reports[0].points[index].status = MotionStatus::Flagged;
         parts.reports[0].points[index].reason = Some("joint 5 outside the measured region".to_owned());
     }
     let refused = &mut parts.reports[0].points[40];
-    (refused.status, refused.reason) = (Status::Refused, Some("out of reach".to_owned()));
+    (refused.status, refused.reason) = (MotionStatus::Refused, Some("out of reach".to_owned()));
     (refused.joints_after, refused.after) = (None, None);
     let read = read(&parts);
     let labels = |name: &str| {

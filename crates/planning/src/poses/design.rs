@@ -36,7 +36,7 @@ pub struct Design<'a> {
 const QUESTIONS: f64 = 3.0;
 const ROUNDS: usize = 12;
 /// Smallest gain of an exchange.
-const LEAST_GAIN: f64 = 1e-9;
+const MIN_GAIN: f64 = 1e-9;
 /// Combinations with an eigenvalue below this share of the largest are not determined by the candidates.
 const DETERMINED: f64 = 1e-12;
 
@@ -70,13 +70,13 @@ impl Part {
     fn gains(&self, per: usize, information: &DMatrix<f64>) -> Option<Vec<f64>> {
         let inverse = Cholesky::new(information.clone())?.inverse();
         let count = self.readings.ncols() / per;
-        const PORTION: usize = 128;
-        let portions: Vec<Vec<f64>> = (0..count)
+        const CHUNK: usize = 128;
+        let chunks: Vec<Vec<f64>> = (0..count)
             .into_par_iter()
-            .step_by(PORTION)
+            .step_by(CHUNK)
             .map(|first| {
                 checkpoint();
-                let some = PORTION.min(count - first);
+                let some = CHUNK.min(count - first);
                 let x = self.readings.columns(first * per, some * per);
                 let vx = &inverse * x;
                 (0..some)
@@ -88,7 +88,7 @@ impl Part {
                     .collect()
             })
             .collect();
-        Some(portions.concat())
+        Some(chunks.concat())
     }
 }
 
@@ -144,7 +144,7 @@ impl Design<'_> {
             for index in 0..chosen.len() {
                 let all = gains(&chosen, Some(index))?;
                 let Some(other) = best(&all, &taken) else { break };
-                if all[other] > all[chosen[index]] + LEAST_GAIN {
+                if all[other] > all[chosen[index]] + MIN_GAIN {
                     taken[chosen[index]] = false;
                     taken[other] = true;
                     chosen[index] = other;

@@ -20,7 +20,7 @@ use truegrind_calibration::diagnosis::something_else::SomethingElse;
 use truegrind_math::work::checkpoint;
 
 /// Number of candidates considered. They are random, so the first ones serve; the cost grows with the square.
-const MOST: usize = 2000;
+const MAX_CANDIDATES: usize = 2000;
 
 /// Joints that the field depends on: the last one rotates the target about itself.
 const JOINTS: usize = 5;
@@ -45,7 +45,7 @@ pub struct FieldUncertainty {
     /// With as many random ones, mean of ten draws.
     pub random_mm: f64,
     /// Where the chosen poses tell little ([`TELLS`]): the number of poses that would halve it, and what remains with them; fewer do not
-    /// within [`MOST_POSES`].
+    /// within [`MAX_POSES`].
     pub needed: Option<(usize, f64)>,
 }
 
@@ -53,7 +53,7 @@ pub struct FieldUncertainty {
 pub const TELLS: f64 = 0.9;
 
 /// Most poses that are suggested.
-pub const MOST_POSES: usize = 160;
+pub const MAX_POSES: usize = 160;
 
 /// Covariances of the field between two lists of poses.
 fn covariances(unexplained: &SomethingElse, a: &[Joints], b: &[Joints]) -> DMatrix<f64> {
@@ -75,7 +75,7 @@ fn covariances(unexplained: &SomethingElse, a: &[Joints], b: &[Joints]) -> DMatr
 impl FieldDesign {
     /// Of the field at candidates; `None` if a number is not finite or the file states no noise.
     pub fn of(unexplained: &SomethingElse, candidates: &[Joints]) -> Option<Self> {
-        let candidates = &candidates[..candidates.len().min(MOST)];
+        let candidates = &candidates[..candidates.len().min(MAX_CANDIDATES)];
         let measured: Vec<Joints> = unexplained
             .poses
             .iter()
@@ -127,9 +127,9 @@ impl FieldDesign {
     }
 
     /// The fewest poses, in steps of a factor of two from `from`, with which at most half of `before_mm` remains, and what remains;
-    /// [`MOST_POSES`] if no fewer do.
+    /// [`MAX_POSES`] if no fewer do.
     pub fn needed(&self, from: usize, before_mm: f64) -> (usize, f64) {
-        let chosen = self.choose(MOST_POSES.min(self.weights.len()), &[]);
+        let chosen = self.choose(MAX_POSES.min(self.weights.len()), &[]);
         let mut count = from.max(1);
         loop {
             count = (2 * count).min(chosen.len());

@@ -49,7 +49,7 @@ pub(super) struct CollisionChecker<'a> {
 const ENDS: usize = 9;
 
 /// Finest interval, as motion of an end (mm): a motion that is not cleared at this resolution counts as blocked.
-const FINEST_MM: f64 = 0.2;
+const MIN_INTERVAL_MM: f64 = 0.2;
 
 impl<'a> CollisionChecker<'a> {
     pub(super) fn of(setup: &'a MeasurementSetup<'a>, space: &'a KeepOut) -> Self {
@@ -168,7 +168,7 @@ impl<'a> CollisionChecker<'a> {
         if self.has_clearance(&shape, &half) {
             return true;
         }
-        half.in_base_mm.iter().any(|half| *half > FINEST_MM)
+        half.in_base_mm.iter().any(|half| *half > MIN_INTERVAL_MM)
             && self.has_clearance(&shape, &Moved::default())
             && self.interval_is_clear(from, &middle, &half)
             && self.interval_is_clear(&middle, to, &half)
@@ -203,7 +203,7 @@ impl<'a> CollisionChecker<'a> {
         let length = |a: &Joints, b: &Joints| (a - b).amax();
         let mut near: Vec<&Joints> = known.iter().collect();
         near.sort_by(|a, b| (length(from, a) + length(a, to)).total_cmp(&(length(from, b) + length(b, to))));
-        near.truncate(MOST_STOPS);
+        near.truncate(MAX_STOPS);
         let reached: Vec<&Joints> =
             near.iter().copied().filter(|stop| self.motion_is_clear(from, stop)).collect();
         let leaving: Vec<&Joints> =
@@ -213,7 +213,7 @@ impl<'a> CollisionChecker<'a> {
         }
         let pairs = reached.iter().flat_map(|first| leaving.iter().map(move |second| (*first, *second)));
         let found =
-            pairs.into_iter().take(MOST_PAIRS).find(|(first, second)| self.motion_is_clear(first, second));
+            pairs.into_iter().take(MAX_PAIRS).find(|(first, second)| self.motion_is_clear(first, second));
         found.map(|(first, second)| vec![*first, *second])
     }
 }
@@ -257,8 +257,8 @@ const TOUCHED: usize = 8;
 const WRIST: usize = 4;
 
 /// Most stops tried for a motion, and most pairs of them.
-const MOST_STOPS: usize = 200;
-const MOST_PAIRS: usize = 2000;
+const MAX_STOPS: usize = 200;
+const MAX_PAIRS: usize = 2000;
 
 /// Whether a capsule is clear of a box. The distance of its midpoint decides most cases.
 fn keeps_off(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2], radius: f64) -> bool {

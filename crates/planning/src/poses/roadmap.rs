@@ -10,7 +10,7 @@ use super::keep_out::CollisionChecker;
 use truegrind_arm::model::Joints;
 
 /// Most neighbours that each node is connected to.
-const NEAREST: usize = 12;
+const MAX_NEIGHBOURS: usize = 12;
 
 /// Weight of a wrist joint in the distance, relative to the first three joints.
 const WRIST: f64 = 0.2;
@@ -31,7 +31,7 @@ impl Roadmap {
             let mut near: Vec<(usize, f64)> =
                 (0..nodes.len()).filter(|&j| j != i).map(|j| (j, apart(from, &nodes[j]))).collect();
             near.sort_by(|a, b| a.1.total_cmp(&b.1));
-            near.truncate(NEAREST);
+            near.truncate(MAX_NEIGHBOURS);
             for (j, _) in near {
                 let known = edges[i].iter().any(|(other, _)| *other == j);
                 if !known && checker.motion_is_clear(from, &nodes[j]) {

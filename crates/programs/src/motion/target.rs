@@ -7,7 +7,7 @@ use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
 
 /// The largest plausible coordinate of a frame or target (mm), and joint angle (°).
-pub const FARTHEST_MM: f64 = 1e6;
+pub const MAX_POSITION_MM: f64 = 1e6;
 
 /// A frame as a program writes it: position and scalar-first quaternion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,9 +35,9 @@ impl Frame {
     /// Checks that the frame is plausible.
     ///
     /// # Errors
-    /// [`Reason::BeyondReach`] for a coordinate beyond [`FARTHEST_MM`], or one that is not finite.
+    /// [`Reason::BeyondReach`] for a coordinate beyond [`MAX_POSITION_MM`], or one that is not finite.
     pub fn within_reach(self) -> Result<Frame, Reason> {
-        let plausible = self.position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM);
+        let plausible = self.position_mm.iter().all(|coordinate| coordinate.abs() <= MAX_POSITION_MM);
         let finite = self.quaternion.iter().all(|part| part.is_finite());
         if plausible && finite { Ok(self) } else { Err(Reason::BeyondReach) }
     }

@@ -11,7 +11,7 @@ use crate::motion::Reason;
 use crate::rapid::number;
 
 /// The largest number that a control holds in a word.
-pub(super) const LARGEST: f64 = 1e9;
+pub(super) const MAX_NUMBER: f64 = 1e9;
 
 /// The largest nesting depth.
 const DEPTH: u32 = 64;

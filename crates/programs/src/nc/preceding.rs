@@ -5,7 +5,7 @@ use smallvec::{SmallVec, smallvec};
 use crate::dataflow::Lattice;
 
 /// More are as good as unknown.
-const MOST: usize = 64;
+const MAX_PRECEDING: usize = 64;
 
 /// The motions of which one ended last, in order; none where that is unknown.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -49,7 +49,7 @@ impl Lattice for Preceding {
         self.motions.sort_unstable();
         self.motions.dedup();
         self.joined = true;
-        if self.motions.len() > MOST {
+        if self.motions.len() > MAX_PRECEDING {
             *self = Preceding::default();
         }
     }

@@ -29,7 +29,7 @@ use super::orientation::{Angles, vector_and_spin};
 use super::task::{BlockContext, StateEvent, Task};
 use crate::edit::{EditError, Edits};
 use crate::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
-use crate::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
+use crate::rewrite::{Change, Extra, FileEdits, NewTarget, RewriteOptions, RewriteOutcome, Rewritten};
 
 /// The most passes over a file whose arcs do not fit; then the file is left unmodified.
 const MAX_PASSES: u32 = 32;
@@ -40,7 +40,7 @@ impl Task<'_> {
     /// # Errors
     /// Edits that overlap, which is a defect of this module.
     pub fn rewrite(&self, changes: &[Change], options: &RewriteOptions) -> Result<Rewritten, EditError> {
-        let mut outcomes = vec![Outcome::Unchanged; changes.len()];
+        let mut outcomes = vec![RewriteOutcome::Unchanged; changes.len()];
         let mut wanted: HashMap<u32, usize> = HashMap::with_capacity(changes.len());
         for (index, change) in changes.iter().enumerate() {
             let refusal = match self.listing.motions.get(change.motion as usize) {
@@ -49,7 +49,7 @@ impl Task<'_> {
                 Some(motion) => self.refusal(motion, change),
             };
             match refusal {
-                Some(reason) => outcomes[index] = Outcome::Refused(reason),
+                Some(reason) => outcomes[index] = RewriteOutcome::Refused(reason),
                 None => {
                     wanted.insert(change.motion, index);
                 }
@@ -70,7 +70,7 @@ impl Task<'_> {
             let mut again = false;
             for motion in unfit_arcs {
                 if let Some(index) = wanted.remove(&motion) {
-                    outcomes[index] = Outcome::Refused(Reason::WrongShape);
+                    outcomes[index] = RewriteOutcome::Refused(Reason::WrongShape);
                     again = true;
                 }
             }
@@ -80,7 +80,7 @@ impl Task<'_> {
                 }
                 for motion in self.motions_on_long_lines(&edits, &wanted) {
                     if let Some(index) = wanted.remove(&motion) {
-                        outcomes[index] = Outcome::Refused(Reason::LineTooLong);
+                        outcomes[index] = RewriteOutcome::Refused(Reason::LineTooLong);
                         again = true;
                     }
                 }
@@ -91,8 +91,10 @@ impl Task<'_> {
             passes += 1;
             if passes == MAX_PASSES {
                 wanted.clear();
-                for outcome in outcomes.iter_mut().filter(|outcome| !matches!(outcome, Outcome::Refused(_))) {
-                    *outcome = Outcome::Refused(Reason::BeforeUnmodifiedArc);
+                for outcome in
+                    outcomes.iter_mut().filter(|outcome| !matches!(outcome, RewriteOutcome::Refused(_)))
+                {
+                    *outcome = RewriteOutcome::Refused(Reason::BeforeUnmodifiedArc);
                 }
                 edits.iter_mut().for_each(|edits| *edits = Edits::new());
             }
@@ -112,7 +114,7 @@ impl Task<'_> {
         options: &RewriteOptions,
         pinned: &BTreeSet<u32>,
         edits: &mut Vec<Edits>,
-        outcomes: &mut [Outcome],
+        outcomes: &mut [RewriteOutcome],
     ) -> Vec<u32> {
         let mut rewriter = Rewriter {
             task: self,
@@ -224,7 +226,7 @@ struct Rewriter<'f, 's> {
 
 impl<'s> Rewriter<'_, 's> {
     /// Writes one motion, with its change if it has one.
-    fn motion(&mut self, index: u32, change: Option<&Change>) -> Outcome {
+    fn motion(&mut self, index: u32, change: Option<&Change>) -> RewriteOutcome {
         let task = self.task;
         let motion = &task.listing.motions[index as usize];
         let context = &task.contexts[index as usize];
@@ -237,7 +239,7 @@ impl<'s> Rewriter<'_, 's> {
                 self.restate_words(motion, context);
             }
             self.skip_unmodified(motion, context);
-            return Outcome::Unchanged;
+            return RewriteOutcome::Unchanged;
         };
         let start = self.control.start(context);
         let new = change.and_then(|change| goal_of(motion, change)).map(|goal| {
@@ -249,12 +251,12 @@ impl<'s> Rewriter<'_, 's> {
         let adds = change.is_some_and(|change| !change.before.is_empty());
         if new.is_none() && !adds && self.is_as_intended(context, &start) {
             self.update_after_motion(&to, context, None);
-            return Outcome::Unchanged;
+            return RewriteOutcome::Unchanged;
         }
         let original = Goal { position: to.position_mm, rotation: None, via: via_of(motion) };
         let mut goal = new.unwrap_or(original);
         let mut arc = None;
-        let mut outcome = Outcome::Unchanged;
+        let mut outcome = RewriteOutcome::Unchanged;
         if context.arc.is_some() && !straightens {
             let by_radius = task.block_words(motion, context).2.radius.is_some();
             let intended =
@@ -264,7 +266,7 @@ impl<'s> Rewriter<'_, 's> {
                 self.unfit_arcs.push(index);
                 // No circle fits: the motion is refused.
                 if change.is_some() {
-                    outcome = Outcome::Refused(Reason::WrongShape);
+                    outcome = RewriteOutcome::Refused(Reason::WrongShape);
                     goal = Goal { position: to.position_mm, rotation: None, via: via_of(motion) };
                     arc = intended
                         .and_then(|intended| self.arc(&mut goal, start, context, (intended, by_radius)));
@@ -274,17 +276,21 @@ impl<'s> Rewriter<'_, 's> {
         let (.., mut slots) = task.block_words(motion, context);
         if straightens {
             self.straighten(motion, &mut slots, change.is_some_and(|change| change.before.is_empty()));
-            outcome = Outcome::InPlace;
+            outcome = RewriteOutcome::InPlace;
         }
         if let Some(change) = change
-            && !matches!(outcome, Outcome::Refused(_))
+            && !matches!(outcome, RewriteOutcome::Refused(_))
             && !change.before.is_empty()
         {
             self.extras(motion, context, &slots, &change.before, &to);
-            outcome = Outcome::InPlace;
+            outcome = RewriteOutcome::InPlace;
         }
         let done = self.write(motion, context, &slots, &goal, arc);
-        if matches!(outcome, Outcome::Refused(_)) || done == Outcome::Unchanged { outcome } else { done }
+        if matches!(outcome, RewriteOutcome::Refused(_)) || done == RewriteOutcome::Unchanged {
+            outcome
+        } else {
+            done
+        }
     }
 
     /// The control state after a motion that was written, or that is unmodified (`commanded` is `None`).
@@ -326,7 +332,7 @@ impl<'s> Rewriter<'_, 's> {
         slots: &WordSlots<'s>,
         goal: &Goal,
         arc: Option<Arc>,
-    ) -> Outcome {
+    ) -> RewriteOutcome {
         let task = self.task;
         let file = motion.place.file as usize;
         let (tree, dialect) = (&task.trees[file], task.dialects[file]);
@@ -517,7 +523,7 @@ impl<'s> Rewriter<'_, 's> {
                 order: [None; ORDER],
                 end: 0,
                 added: Vec::new(),
-                replaced: Outcome::Unchanged,
+                replaced: RewriteOutcome::Unchanged,
                 spaced: true,
                 lead: None,
             };

@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use super::called::program_of;
 use super::dialect::{Dialect, SAMPLE, lines};
 use super::orientation::Angles;
-use crate::motion::{FARTHEST_MM, Frame, ToolValue};
+use crate::motion::{Frame, MAX_POSITION_MM, ToolValue};
 
 pub use crate::label::{plain, same};
 
@@ -105,7 +105,7 @@ pub(super) fn stated_control(source: &[u8]) -> Option<Dialect> {
 }
 
 /// Largest plausible joint angle (°).
-pub const MOST_DEG: f64 = 3600.0;
+pub const MAX_JOINT_DEG: f64 = 3600.0;
 
 /// Parses a comment as a statement of a frame, tool, convention or start; the error is what was expected.
 pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
@@ -135,7 +135,7 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
     }
     if what == "start" {
         let (_, list) = text.split_at(text.find('[').unwrap_or(text.len()));
-        let near = |joints: &[f64; 6]| joints.iter().all(|angle| angle.abs() <= MOST_DEG);
+        let near = |joints: &[f64; 6]| joints.iter().all(|angle| angle.abs() <= MAX_JOINT_DEG);
         return numbers(list).filter(near).map(|joints| Some(Statement::Start(joints))).ok_or_else(|| {
             "`truegrind start [q1,q2,q3,q4,q5,q6]`: the joints in which the arm starts, in degrees".to_owned()
         });
@@ -166,7 +166,7 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
 fn frame(text: &str) -> Option<Frame> {
     let [x, y, z, w, i, j, k] = numbers(text)?;
     let square = w * w + i * i + j * j + k * k;
-    let near = [x, y, z].iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM);
+    let near = [x, y, z].iter().all(|coordinate| coordinate.abs() <= MAX_POSITION_MM);
     (near && (square - 1.0).abs() < 1e-3)
         .then_some(Frame { position_mm: [x, y, z], quaternion: [w, i, j, k] })
 }

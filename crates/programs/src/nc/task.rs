@@ -34,7 +34,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc as Shared;
 
 use super::dialect::Dialect;
-use super::expression::{LARGEST, Variable, literal};
+use super::expression::{MAX_NUMBER, Variable, literal};
 use super::mark;
 use super::modal_group::ModalGroup;
 use super::modal_state::{ModalState, MotionMode, WordSemantics};
@@ -571,7 +571,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             let feed = self.evaluate_word(&block.words[index]).0;
             // F words are literals: a whole number needs no decimal point on any control.
             let feed = self.literal(&block.words[index]).ok_or(Reason::UnknownVariable).or(feed);
-            let feed = feed.and_then(|feed| match feed > 0.0 && feed < LARGEST {
+            let feed = feed.and_then(|feed| match feed > 0.0 && feed < MAX_NUMBER {
                 true => Ok(feed),
                 // Controls reject F0 and F-5, and read a number that is too large differently.
                 false => Err(Reason::NumberRange),

@@ -12,13 +12,13 @@ mod call;
 mod invalidate;
 
 use super::evaluate::{Context, Evaluator, Known};
-use super::instruction::{self, Also, INSTRUCTIONS, Instruction};
+use super::instruction::{self, INSTRUCTIONS, Instruction, SideEffect};
 use super::modal::{Switch, SwitchSet, switches_set_by};
 use super::payload::{self, Gripped};
 use super::predefined;
 use super::reaching_motions::ReachingMotions;
 use super::symbol::facts::{counts_from_position, is_resuming_handler};
-use super::symbol::{SymbolKind, Unit};
+use super::symbol::{Body, SymbolKind};
 use super::syntax::{RapidTree, Syntax, arguments, parts, token_kind};
 use super::token::{Token, same_name};
 use super::value::Value;
@@ -111,7 +111,7 @@ pub(super) trait Visitor {
     /// A call, with the index in the table of instructions if it is `known` there; returns the index of the motion if it is one.
     fn visit_call(
         &mut self,
-        unit: Unit,
+        body: Body,
         node: u32,
         known: Option<usize>,
         state: &AbstractState,
@@ -129,7 +129,7 @@ pub(super) trait Visitor {
     fn record_loop(&mut self) -> u32;
     /// An iteration of the loop may end after these motions.
     fn record_loop_end(&mut self, iteration: u32, reaching: &ReachingMotions);
-    /// The unit may end after these motions.
+    /// The body may end after these motions.
     fn record_end(&mut self, reaching: &ReachingMotions);
     /// A call by a computed name, with the switches at the call.
     fn record_late_call(&mut self, modal: SwitchSet);
@@ -138,22 +138,22 @@ pub(super) trait Visitor {
     /// A displacement is counted from the robot's current position.
     fn record_position_use(&mut self, reaching: &ReachingMotions);
     /// The program decides by the robot's current position, in the expression at a node.
-    fn record_position_decision(&mut self, unit: Unit, node: u32, reaching: &ReachingMotions);
+    fn record_position_decision(&mut self, body: Body, node: u32, reaching: &ReachingMotions);
     /// The next cycle enters main with these switches and this load.
     fn record_cycle_restart(&mut self, modal: SwitchSet, gripped: Gripped);
 }
 
-/// Interprets one unit; returns what holds at its end.
-pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn Visitor) -> Exit {
+/// Interprets one body; returns what holds at its end.
+pub(super) fn interpret_body(evaluator: &Evaluator<'_, '_>, body: Body, visitor: &mut dyn Visitor) -> Exit {
     let symbols = evaluator.symbols;
-    let tree = &evaluator.trees[unit.file as usize];
-    let resumes = tree.child_nodes(unit.node).any(|clause| is_resuming_handler(tree, clause));
-    let aliases = aliases(evaluator, unit);
-    let moved_between = symbols.may_move_between_statements(evaluator.trees, unit);
+    let tree = &evaluator.trees[body.file as usize];
+    let resumes = tree.child_nodes(body.node).any(|clause| is_resuming_handler(tree, clause));
+    let aliases = aliases(evaluator, body);
+    let moved_between = symbols.may_move_between_statements(evaluator.trees, body);
     let tracks_motions = symbols.tracks_motions;
     let mut interpreter = Interpreter {
         evaluator,
-        unit,
+        body,
         state: AbstractState::default(),
         visitor,
         exit: Exit::default(),
@@ -168,32 +168,32 @@ pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor:
     };
     interpreter.handler_switches = interpreter.handler_switches();
     interpreter.any =
-        interpreter.switches_set_under(unit.node).join(interpreter.handler_switches).join(SwitchSet::ENTRY);
-    if let Some(routine) = unit.routine
-        && tree.child_nodes(unit.node).any(|clause| is_exception_clause(tree.nodes.kind(clause)))
+        interpreter.switches_set_under(body.node).join(interpreter.handler_switches).join(SwitchSet::ENTRY);
+    if let Some(routine) = body.routine
+        && tree.child_nodes(body.node).any(|clause| is_exception_clause(tree.nodes.kind(clause)))
     {
         // An error may leave a callee at any point.
         interpreter.any = interpreter.any.join(symbols.effects_of(routine).switches);
     }
-    if interpreter.may_grip_under(unit.node) {
+    if interpreter.may_grip_under(body.node) {
         interpreter.any_gripped = Gripped::UNKNOWN;
     }
     let reaching = if tracks_motions { ReachingMotions::routine_entry() } else { ReachingMotions::default() };
     let mut state =
         AbstractState { modal: SwitchSet::ENTRY, reaching, reachable: true, ..AbstractState::default() };
     // ExitCycle restarts main without reinitialising its variables.
-    if unit
+    if body
         .routine
         .is_some_and(|routine| !(symbols.restarts_main && symbols.is_main(evaluator.trees, routine)))
     {
-        for &id in symbols.written_in(unit) {
+        for &id in symbols.written_in(body) {
             // A variable of the routine has its initial value at every call.
             let symbol = &symbols.symbols[id as usize];
-            if symbol.scope == unit.scope
+            if symbol.scope == body.scope
                 && !symbol.volatile
                 && matches!(&symbol.kind, SymbolKind::Data(data) if data.storage == Token::Var)
             {
-                let context = Context::new(unit.file, unit.scope, &state.known);
+                let context = Context::new(body.file, body.scope, &state.known);
                 if let Some(value) = evaluator.initial_value(context, id) {
                     state.known.insert(id, value);
                 }
@@ -201,7 +201,7 @@ pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor:
         }
     }
     interpreter.state = state;
-    interpreter.walk(unit.node, Nesting::default());
+    interpreter.walk(body.node, Nesting::default());
     let state = std::mem::take(&mut interpreter.state);
     if state.reachable {
         interpreter.leave(&state);
@@ -209,22 +209,22 @@ pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor:
     interpreter.exit
 }
 
-/// The parameters of a unit that may alias outside data or each other.
-fn aliases(evaluator: &Evaluator<'_, '_>, unit: Unit) -> Vec<u32> {
-    let Some(routine) = unit.routine else { return Vec::new() };
-    let tree = &evaluator.trees[unit.file as usize];
+/// The parameters of a body that may alias outside data or each other.
+fn aliases(evaluator: &Evaluator<'_, '_>, body: Body) -> Vec<u32> {
+    let Some(routine) = body.routine else { return Vec::new() };
+    let tree = &evaluator.trees[body.file as usize];
     let parameters = &evaluator.symbols.routines[routine as usize].head.parameters;
     let referred = parameters.iter().filter(|parameter| parameter.by_reference);
-    referred.filter_map(|parameter| evaluator.symbols.find(unit.scope, tree.text(parameter.name))).collect()
+    referred.filter_map(|parameter| evaluator.symbols.find(body.scope, tree.text(parameter.name))).collect()
 }
 
 struct Interpreter<'w, 'a, 's> {
     evaluator: &'w Evaluator<'a, 's>,
-    unit: Unit,
+    body: Body,
     state: AbstractState,
     visitor: &'w mut dyn Visitor,
     exit: Exit,
-    /// The switches that any statement of the unit may set: those at a point reachable from anywhere.
+    /// The switches that any statement of the body may set: those at a point reachable from anywhere.
     any: SwitchSet,
     /// The load at such a point.
     any_gripped: Gripped,
@@ -242,10 +242,10 @@ struct Interpreter<'w, 'a, 's> {
     loops: Vec<u32>,
 }
 
-/// What a node of a unit is for the flow of control.
-pub(super) fn control(tree: &RapidTree<'_>, unit: Unit, node: u32) -> Control {
+/// What a node of a body is for the flow of control.
+pub(super) fn control(tree: &RapidTree<'_>, body: Body, node: u32) -> Control {
     match tree.nodes.kind(node) {
-        kind if unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) => Control::Apart,
+        kind if body.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) => Control::Apart,
         Syntax::Body => Control::Sequence,
         Syntax::CompactIf => Control::Optional,
         Syntax::If | Syntax::Test => Control::Branches,
@@ -269,11 +269,11 @@ impl Transfer for Interpreter<'_, '_, '_> {
     }
 
     fn size(&self, node: u32) -> u32 {
-        self.evaluator.trees[self.unit.file as usize].nodes.get(node).size
+        self.evaluator.trees[self.body.file as usize].nodes.get(node).size
     }
 
     fn control(&self, node: u32) -> Control {
-        control(&self.evaluator.trees[self.unit.file as usize], self.unit, node)
+        control(&self.evaluator.trees[self.body.file as usize], self.body, node)
     }
 
     fn transfer(&mut self, node: u32, nesting: Nesting) {
@@ -366,7 +366,7 @@ impl Transfer for Interpreter<'_, '_, '_> {
 
 impl Interpreter<'_, '_, '_> {
     fn kind(&self, node: u32) -> Syntax {
-        self.evaluator.trees[self.unit.file as usize].nodes.kind(node)
+        self.evaluator.trees[self.body.file as usize].nodes.kind(node)
     }
 
     /// Records decisions by the robot's position in a statement or expression, and in the functions that it calls.
@@ -375,17 +375,17 @@ impl Interpreter<'_, '_, '_> {
         if symbols.position_decisions.is_empty() {
             return;
         }
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         for node in node..tree.nodes.subtree_end(node) {
             let decides = match tree.nodes.kind(node) {
                 Syntax::Function | Syntax::Call => {
-                    let called = symbols.callees(self.unit.scope, tree.text(tree.nodes.first(node)));
+                    let called = symbols.callees(self.body.scope, tree.text(tree.nodes.first(node)));
                     called.iter().any(|routine| symbols.effects_of(*routine).decides_by_position)
                 }
                 _ => false,
             };
-            if decides || symbols.position_decisions.contains(&(self.unit.file, node)) {
-                self.visitor.record_position_decision(self.unit, node, &state.reaching);
+            if decides || symbols.position_decisions.contains(&(self.body.file, node)) {
+                self.visitor.record_position_decision(self.body, node, &state.reaching);
             }
         }
     }
@@ -446,11 +446,11 @@ impl Interpreter<'_, '_, '_> {
 
     /// The displacement after PDispSet, PDispOn, PDispAdd or PDispOff.
     fn displacement_value(&self, node: u32, state: &AbstractState, name: &[u8]) -> Value {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         if same_name(name, b"PDispOff") {
             return Value::from_frame(&Frame::IDENTITY);
         }
-        let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+        let context = Context::new(self.body.file, self.body.scope, &state.known);
         let first =
             arguments(tree, node).find(|argument| !argument.optional).and_then(|argument| argument.value);
         let option = |wanted: &[u8]| {
@@ -483,10 +483,10 @@ impl Interpreter<'_, '_, '_> {
         frame.map_or(Value::Unknown(Reason::Displacement), |frame| Value::from_frame(&frame))
     }
 
-    /// The switches that the unit's error handlers set before they resume, and those that trap routines leave set.
+    /// The switches that the body's error handlers set before they resume, and those that trap routines leave set.
     fn handler_switches(&mut self) -> SwitchSet {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
-        let clauses = tree.child_nodes(self.unit.node);
+        let tree = &self.evaluator.trees[self.body.file as usize];
+        let clauses = tree.child_nodes(self.body.node);
         let clauses: Vec<u32> =
             clauses.filter(|&clause| tree.nodes.kind(clause) == Syntax::ErrorClause).collect();
         let handler_switches = clauses
@@ -494,7 +494,7 @@ impl Interpreter<'_, '_, '_> {
             .fold(SwitchSet::EMPTY, |all, clause| all.join(self.switches_set_under(clause)));
         let symbols = self.evaluator.symbols;
         // Trap routines do not interrupt each other.
-        if self.unit.routine.is_some_and(|routine| symbols.interrupts[routine as usize]) {
+        if self.body.routine.is_some_and(|routine| symbols.interrupts[routine as usize]) {
             return handler_switches;
         }
         let left = |all: SwitchSet, routine: &u32| {
@@ -505,20 +505,20 @@ impl Interpreter<'_, '_, '_> {
 
     /// The switches that statements under a node may set.
     fn switches_set_under(&mut self, node: u32) -> SwitchSet {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         let end = tree.nodes.subtree_end(node);
         let symbols = self.evaluator.symbols;
         let mut out = SwitchSet::EMPTY;
-        for &node in symbols.switch_calls_in(self.unit, node..end) {
+        for &node in symbols.switch_calls_in(self.body, node..end) {
             let name = tree.text(tree.nodes.first(node));
             let late = tree.nodes.kind(node) == Syntax::LateCall;
-            let called = if late { &[] } else { symbols.callees(self.unit.scope, name) };
+            let called = if late { &[] } else { symbols.callees(self.body.scope, name) };
             if let Some(sets) =
                 (!late && called.is_empty()).then(|| switches_set_by(tree, node, name)).flatten()
             {
                 out = out.join(sets);
             } else if called.is_empty() {
-                out = out.join(symbols.late_switches_of(self.unit));
+                out = out.join(symbols.late_switches_of(self.body));
             }
             for &routine in called {
                 out = out.join(self.visitor.exit_of(routine).modal);
@@ -532,7 +532,7 @@ impl Interpreter<'_, '_, '_> {
     }
 
     fn transfer_call(&mut self, node: u32, state: &mut AbstractState, nesting: Nesting) {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         let symbols = self.evaluator.symbols;
         let name = tree.text(tree.nodes.first(node));
         let late = tree.nodes.kind(node) == Syntax::LateCall;
@@ -540,16 +540,16 @@ impl Interpreter<'_, '_, '_> {
         for inside in tree.child_nodes(node) {
             self.invalidate_changed(inside, state);
         }
-        let hidden = symbols.hides_instruction && symbols.routine(self.unit.scope, name).is_some();
+        let hidden = symbols.hides_instruction && symbols.routine(self.body.scope, name).is_some();
         let known = if late || hidden { None } else { instruction::find(name) };
-        let motion = self.visitor.visit_call(self.unit, node, known, state, nesting);
+        let motion = self.visitor.visit_call(self.body, node, known, state, nesting);
         if let Some(known) = known {
             self.transfer_motion_instruction(node, &INSTRUCTIONS[known], motion, state);
             return;
         }
         let incremented = self.incremented(node, state, name);
         self.invalidate_written(node, state);
-        if !late && symbols.writes_unknown_data(tree, self.unit.scope, node, name) {
+        if !late && symbols.writes_unknown_data(tree, self.body.scope, node, name) {
             state.known.retain(|&id, _| id == DISPLACEMENT);
         }
         if let Some((target, value)) = incremented {
@@ -558,12 +558,12 @@ impl Interpreter<'_, '_, '_> {
         if predefined::waits(name) {
             self.invalidate_shared(state);
         }
-        let own = symbols.routine(self.unit.scope, name).is_some();
+        let own = symbols.routine(self.body.scope, name).is_some();
         if let Some(sets) = (!late && !own).then(|| switches_set_by(tree, node, name)).flatten() {
             self.transfer_switch_instruction(node, name, sets, motion, state);
             return;
         }
-        let called = if late { &[] } else { symbols.callees(self.unit.scope, name) };
+        let called = if late { &[] } else { symbols.callees(self.body.scope, name) };
         if late || called.is_empty() && predefined::calls_by_name(name) {
             if self.may_grip(node) {
                 state.gripped = Gripped::UNKNOWN;
@@ -580,7 +580,7 @@ impl Interpreter<'_, '_, '_> {
                     return;
                 }
                 if predefined::grips(name) {
-                    let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+                    let context = Context::new(self.body.file, self.body.scope, &state.known);
                     state.gripped = payload::gripped_by(self.evaluator, context, tree, node);
                 }
                 if predefined::displaces(name).is_some() {
@@ -615,7 +615,7 @@ impl Interpreter<'_, '_, '_> {
         if !known.only_moves() {
             self.invalidate_written(node, state);
         }
-        if known.also == Also::Stiffens {
+        if known.side_effect == SideEffect::Stiffens {
             state.modal = state.modal.set(Switch::Soft, false);
         }
         if motion.is_some() {
@@ -635,7 +635,7 @@ impl Interpreter<'_, '_, '_> {
         motion: Option<u32>,
         state: &mut AbstractState,
     ) {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         state.modal = state.modal.overwrite(sets);
         if counts_from_position(tree, node, name) {
             self.visitor.record_position_use(&state.reaching);

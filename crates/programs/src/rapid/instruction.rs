@@ -27,7 +27,7 @@ pub enum Slot {
 
 /// The instruction for motions inserted before a motion without interrupting its process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Between {
+pub enum InsertedForm {
     /// A plain MoveL or MoveJ.
     Plain,
     /// The same instruction with another target.
@@ -40,7 +40,7 @@ pub enum Between {
 
 /// Effect of a motion instruction besides moving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Also {
+pub enum SideEffect {
     /// Nothing.
     Nothing,
     /// Writes the values of its options whose names begin with Ret.
@@ -66,13 +66,13 @@ pub struct Instruction {
     /// `.` another, `*` any number of others.
     pattern: &'static str,
     /// The instruction for inserted motions.
-    pub between: Between,
+    pub inserted: InsertedForm,
     /// The equivalent instruction with a joint target.
     pub joint_form: Option<&'static str>,
     /// Whether a sensor moves the path.
     pub sensor_guided: bool,
     /// Its effect besides moving.
-    pub also: Also,
+    pub side_effect: SideEffect,
 }
 
 impl Instruction {
@@ -131,17 +131,17 @@ impl Instruction {
 
     /// Whether it may end before its target: on a signal or on contact.
     pub fn ends_early(&self) -> bool {
-        self.also == Also::Stops || self.searches()
+        self.side_effect == SideEffect::Stops || self.searches()
     }
 
     /// Whether it only moves, as nearly every statement of a long program does.
     pub fn only_moves(&self) -> bool {
-        matches!(self.also, Also::Nothing | Also::Triggers) && !self.searches()
+        matches!(self.side_effect, SideEffect::Nothing | SideEffect::Triggers) && !self.searches()
     }
 
     /// Whether motions can be inserted before it. A trigger at a distance along the movement would fire on its last piece.
     pub fn splits(&self) -> bool {
-        self.between != Between::Nothing && self.also != Also::Triggers
+        self.inserted != InsertedForm::Nothing && self.side_effect != SideEffect::Triggers
     }
 
     /// Least number of required arguments.
@@ -151,25 +151,25 @@ impl Instruction {
 }
 
 const fn plain(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
-    let (between, joint_form, also) = (Between::Plain, None, Also::Nothing);
-    Instruction { name, kind, pattern, between, joint_form, sensor_guided: false, also }
+    let (inserted, joint_form, side_effect) = (InsertedForm::Plain, None, SideEffect::Nothing);
+    Instruction { name, kind, pattern, inserted, joint_form, sensor_guided: false, side_effect }
 }
 
 const fn same(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
-    Instruction { between: Between::Same, ..plain(name, kind, pattern) }
+    Instruction { inserted: InsertedForm::Same, ..plain(name, kind, pattern) }
 }
 
 const fn rigid(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
-    Instruction { between: Between::Nothing, ..plain(name, kind, pattern) }
+    Instruction { inserted: InsertedForm::Nothing, ..plain(name, kind, pattern) }
 }
 
 const fn within(
     name: &'static str,
-    between: &'static str,
+    inserted: &'static str,
     kind: MotionKind,
     pattern: &'static str,
 ) -> Instruction {
-    Instruction { between: Between::Other(between), ..plain(name, kind, pattern) }
+    Instruction { inserted: InsertedForm::Other(inserted), ..plain(name, kind, pattern) }
 }
 
 const fn with_joints(instruction: Instruction, joint_form: &'static str) -> Instruction {
@@ -177,11 +177,11 @@ const fn with_joints(instruction: Instruction, joint_form: &'static str) -> Inst
 }
 
 const fn guided(instruction: Instruction) -> Instruction {
-    Instruction { sensor_guided: true, between: Between::Nothing, ..instruction }
+    Instruction { sensor_guided: true, inserted: InsertedForm::Nothing, ..instruction }
 }
 
-const fn besides(instruction: Instruction, also: Also) -> Instruction {
-    Instruction { also, ..instruction }
+const fn besides(instruction: Instruction, side_effect: SideEffect) -> Instruction {
+    Instruction { side_effect, ..instruction }
 }
 
 use MotionKind::{AbsoluteJoint, Circular, External, Joint, Linear};
@@ -205,15 +205,15 @@ pub const INSTRUCTIONS: &[Instruction] = &[
     plain("MoveJGO", Joint, "TSZt."),
     rigid("MoveCGO", Circular, "CTSZt."),
     plain("MoveAbsJGO", AbsoluteJoint, "JSZt."),
-    besides(plain("MoveLSync", Linear, "TSZt."), Also::Calls),
-    besides(plain("MoveJSync", Joint, "TSZt."), Also::Calls),
-    besides(rigid("MoveCSync", Circular, "CTSZt."), Also::Calls),
-    besides(plain("TriggL", Linear, "TS.Zt"), Also::Triggers),
-    besides(plain("TriggJ", Joint, "TS.Zt"), Also::Triggers),
+    besides(plain("MoveLSync", Linear, "TSZt."), SideEffect::Calls),
+    besides(plain("MoveJSync", Joint, "TSZt."), SideEffect::Calls),
+    besides(rigid("MoveCSync", Circular, "CTSZt."), SideEffect::Calls),
+    besides(plain("TriggL", Linear, "TS.Zt"), SideEffect::Triggers),
+    besides(plain("TriggJ", Joint, "TS.Zt"), SideEffect::Triggers),
     rigid("TriggC", Circular, "CTS.Zt"),
-    besides(plain("TriggAbsJ", AbsoluteJoint, "JS.Zt"), Also::Triggers),
-    besides(plain("TriggLIOs", Linear, "TSZt"), Also::Triggers),
-    besides(plain("TriggJIOs", Joint, "TSZt"), Also::Triggers),
+    besides(plain("TriggAbsJ", AbsoluteJoint, "JS.Zt"), SideEffect::Triggers),
+    besides(plain("TriggLIOs", Linear, "TSZt"), SideEffect::Triggers),
+    besides(plain("TriggJIOs", Joint, "TSZt"), SideEffect::Triggers),
     rigid("SearchL", Linear, ".OTSt"),
     rigid("SearchC", Circular, ".OCTSt"),
     rigid("SearchExtJ", External, ".OJS"),
@@ -270,25 +270,25 @@ pub const INSTRUCTIONS: &[Instruction] = &[
     rigid("LaserCStart", Circular, "CTS*Zt"),
     rigid("LaserC", Circular, "CTS*Zt"),
     rigid("LaserCEnd", Circular, "CTS*Zt"),
-    besides(same("CapL", Linear, "TS*Zt"), Also::Triggers),
+    besides(same("CapL", Linear, "TS*Zt"), SideEffect::Triggers),
     rigid("CapC", Circular, "CTS*Zt"),
-    besides(rigid("ContactL", Linear, "TSt"), Also::Stops),
-    besides(rigid("CSSDeactMoveL", Linear, "TSt"), Also::Stiffens),
-    besides(rigid("SCSSDeactMoveL", Linear, "TSt"), Also::Stiffens),
+    besides(rigid("ContactL", Linear, "TSt"), SideEffect::Stops),
+    besides(rigid("CSSDeactMoveL", Linear, "TSt"), SideEffect::Stiffens),
+    besides(rigid("SCSSDeactMoveL", Linear, "TSt"), SideEffect::Stiffens),
     with_joints(plain("SMoveL", Linear, "TSZt"), "MoveAbsJ"),
     with_joints(plain("SMoveJ", Joint, "TSZt"), "MoveAbsJ"),
     plain("SMoveLDO", Linear, "TSZt.."),
     plain("SMoveJDO", Joint, "TSZt.."),
     plain("SMoveLGO", Linear, "TSZt."),
     plain("SMoveJGO", Joint, "TSZt."),
-    besides(plain("SMoveLSync", Linear, "TSZt."), Also::Calls),
-    besides(plain("SMoveJSync", Joint, "TSZt."), Also::Calls),
-    besides(plain("STriggL", Linear, "TS.Zt"), Also::Triggers),
-    besides(plain("STriggJ", Joint, "TS.Zt"), Also::Triggers),
+    besides(plain("SMoveLSync", Linear, "TSZt."), SideEffect::Calls),
+    besides(plain("SMoveJSync", Joint, "TSZt."), SideEffect::Calls),
+    besides(plain("STriggL", Linear, "TS.Zt"), SideEffect::Triggers),
+    besides(plain("STriggJ", Joint, "TS.Zt"), SideEffect::Triggers),
     rigid("SSearchL", Linear, ".OTSt"),
-    besides(rigid("CalibL", Linear, "TS*t"), Also::Returns),
-    besides(rigid("CalibJ", Joint, "TS*t"), Also::Returns),
-    besides(rigid("MeasureWearL", Linear, "TS*t"), Also::Returns),
+    besides(rigid("CalibL", Linear, "TS*t"), SideEffect::Returns),
+    besides(rigid("CalibJ", Joint, "TS*t"), SideEffect::Returns),
+    besides(rigid("MeasureWearL", Linear, "TS*t"), SideEffect::Returns),
     guided(rigid("EGMMoveL", Linear, ".TSZt")),
     guided(rigid("EGMMoveC", Circular, ".CTSZt")),
 ];

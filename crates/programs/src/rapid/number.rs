@@ -10,7 +10,7 @@ const TEN: [f64; 23] = [
 ];
 
 /// More decimals than this are never written.
-pub const MOST_DECIMALS: u8 = 12;
+pub const MAX_DECIMALS: u8 = 12;
 
 /// The value of a number token, correctly rounded; `None` where the bytes are no number.
 ///
@@ -86,7 +86,7 @@ pub fn plain(text: &[u8]) -> Option<(f64, usize, u8)> {
     }
     // Exact in one division (Clinger 1990, the fast path).
     let decimals = point.map_or(0, |point| index - point);
-    Some((mantissa as f64 / TEN[decimals], index, (decimals as u8).min(MOST_DECIMALS)))
+    Some((mantissa as f64 / TEN[decimals], index, (decimals as u8).min(MAX_DECIMALS)))
 }
 
 /// A signed whole number; far beyond the range of a double it stays there.
@@ -117,27 +117,27 @@ pub fn decimals(text: &[u8]) -> u8 {
         [] => 0,
         [_, rest @ ..] => written_exponent(rest).unwrap_or(0),
     };
-    after.saturating_sub(exponent).clamp(0, i32::from(MOST_DECIMALS)) as u8
+    after.saturating_sub(exponent).clamp(0, i32::from(MAX_DECIMALS)) as u8
 }
 
 /// The value rounded to so many decimals, as a whole number of units of the last one.
 pub fn units(value: f64, decimals: u8) -> f64 {
-    round(value * TEN[usize::from(decimals.min(MOST_DECIMALS))])
+    round(value * TEN[usize::from(decimals.min(MAX_DECIMALS))])
 }
 
 /// Half a unit of the last of so many decimals.
 pub fn half_unit(decimals: u8) -> f64 {
-    0.5 / TEN[usize::from(decimals.min(MOST_DECIMALS))]
+    0.5 / TEN[usize::from(decimals.min(MAX_DECIMALS))]
 }
 
 /// Rounds to so many decimals.
 pub fn rounded(value: f64, decimals: u8) -> f64 {
-    units(value, decimals) / TEN[usize::from(decimals.min(MOST_DECIMALS))]
+    units(value, decimals) / TEN[usize::from(decimals.min(MAX_DECIMALS))]
 }
 
 /// Writes a value with exactly so many decimals, never `-0`.
 pub fn write(out: &mut Vec<u8>, value: f64, decimals: u8) {
-    let decimals = decimals.min(MOST_DECIMALS);
+    let decimals = decimals.min(MAX_DECIMALS);
     let units = units(value, decimals);
     if units.abs() >= 9e15 || units.is_nan() {
         // Beyond exact integers; no position of a robot comes here.

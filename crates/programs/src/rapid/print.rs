@@ -23,7 +23,7 @@ const NEAR: usize = 16;
 
 /// The new value of a target; `None` keeps the old configuration.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Fresh {
+pub(super) enum NewValue {
     Cartesian { position_mm: [f64; 3], quaternion: [f64; 4], conf: Option<[i32; 4]> },
     Joint { robot_deg: [f64; 6] },
 }
@@ -60,9 +60,9 @@ fn rounded(quaternion: &[f64; 4], decimals: &[u8; 4]) -> [f64; 4] {
 }
 
 /// Whether a new value differs from the old one where no source decimals are known.
-pub(super) fn changes(old: &TargetValue, fresh: &Fresh, options: &RewriteOptions) -> bool {
+pub(super) fn changes(old: &TargetValue, fresh: &NewValue, options: &RewriteOptions) -> bool {
     match (old, fresh) {
-        (TargetValue::Cartesian(old), Fresh::Cartesian { position_mm, quaternion, conf }) => {
+        (TargetValue::Cartesian(old), NewValue::Cartesian { position_mm, quaternion, conf }) => {
             let new = aligned(quaternion, &old.quaternion);
             let old_turn = aligned(&old.quaternion, &old.quaternion);
             let moved = old.position_mm.iter().zip(position_mm);
@@ -73,7 +73,7 @@ pub(super) fn changes(old: &TargetValue, fresh: &Fresh, options: &RewriteOptions
                     .any(|(&a, &b)| differs(a, b, options.quaternion_decimals, QUATERNION_NOISE))
                 || conf.is_some_and(|conf| conf != old.conf)
         }
-        (TargetValue::Joint(old), Fresh::Joint { robot_deg }) => {
+        (TargetValue::Joint(old), NewValue::Joint { robot_deg }) => {
             let moved = old.robot_deg.iter().zip(robot_deg);
             moved.into_iter().any(|(&a, &b)| differs(a, b, options.joint_decimals, JOINT_NOISE_DEG))
         }
@@ -87,7 +87,7 @@ pub(super) fn replace_numbers(
     text: &[u8],
     at: usize,
     old: Option<&TargetValue>,
-    fresh: &Fresh,
+    fresh: &NewValue,
     options: &RewriteOptions,
     edits: &mut Edits,
 ) -> Option<bool> {
@@ -106,7 +106,7 @@ pub(super) fn replace_numbers(
         }
     };
     match fresh {
-        Fresh::Cartesian { position_mm, quaternion, conf } => {
+        NewValue::Cartesian { position_mm, quaternion, conf } => {
             let numbers = match old.and_then(TargetValue::cartesian) {
                 Some(RobTarget { position_mm: [x, y, z], quaternion: [q1, q2, q3, q4], conf, .. }) => {
                     let [cf1, cf4, cf6, cfx] = conf.map(f64::from);
@@ -143,7 +143,7 @@ pub(super) fn replace_numbers(
                 }
             }
         }
-        Fresh::Joint { robot_deg } => {
+        NewValue::Joint { robot_deg } => {
             let numbers = literal::numbers(text, JOINTTARGET)?;
             for (index, &new) in robot_deg.iter().enumerate() {
                 let decimals = numbers.decimals[index].max(options.joint_decimals);
@@ -157,13 +157,13 @@ pub(super) fn replace_numbers(
 }
 
 /// The old target with the new value.
-pub(super) fn merged(old: &TargetValue, fresh: &Fresh) -> TargetValue {
+pub(super) fn merged(old: &TargetValue, fresh: &NewValue) -> TargetValue {
     let external = match old {
         TargetValue::Cartesian(target) => target.external,
         TargetValue::Joint(target) => target.external,
     };
     match fresh {
-        Fresh::Cartesian { position_mm, quaternion, conf } => {
+        NewValue::Cartesian { position_mm, quaternion, conf } => {
             let (like, old_conf) = match old {
                 TargetValue::Cartesian(target) => (target.quaternion, target.conf),
                 TargetValue::Joint(_) => (*quaternion, [0; 4]),
@@ -175,7 +175,7 @@ pub(super) fn merged(old: &TargetValue, fresh: &Fresh) -> TargetValue {
                 external,
             })
         }
-        Fresh::Joint { robot_deg } => TargetValue::Joint(JointTarget { robot_deg: *robot_deg, external }),
+        NewValue::Joint { robot_deg } => TargetValue::Joint(JointTarget { robot_deg: *robot_deg, external }),
     }
 }
 

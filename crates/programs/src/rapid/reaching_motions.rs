@@ -42,7 +42,7 @@ const MAX_MOTIONS: usize = 256;
 const MAX_KNOWN: usize = 1 << 16;
 
 /// So many elements are inserted one by one.
-const FEW: usize = 8;
+const FEW_ELEMENTS: usize = 8;
 
 impl ReachingMotions {
     /// This motion.
@@ -117,7 +117,7 @@ impl ReachingMotions {
 /// The union.
 impl Lattice for ReachingMotions {
     fn join(&mut self, other: &Self) {
-        if other.last.len() <= FEW {
+        if other.last.len() <= FEW_ELEMENTS {
             other.last.iter().for_each(|last| self.insert(*last));
         } else if self.last != other.last {
             self.last.extend_from_slice(&other.last);

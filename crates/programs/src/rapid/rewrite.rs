@@ -10,18 +10,18 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::instruction::{self, Between, INSTRUCTIONS, Instruction};
+use super::instruction::{self, INSTRUCTIONS, InsertedForm, Instruction};
 use super::lexer::lex;
 use super::mark;
-use super::print::{self, Fresh};
+use super::print::{self, NewValue};
 use super::task::Task;
 use super::token::{Token, folded, keyword, same_name};
 use crate::edit::{EditError, Edits};
 use crate::motion::{Motion, MotionKind, Offset, Origin, Reason, Span, TargetValue};
-use crate::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
+use crate::rewrite::{Change, FileEdits, NewTarget, RewriteOptions, RewriteOutcome, Rewritten};
 
 /// Changes that one thread processes at a time.
-const PORTION: usize = 1024;
+const CHUNK: usize = 1024;
 
 /// Greatest length of a data name.
 const NAME_LENGTH: usize = 32;
@@ -52,7 +52,7 @@ impl Task<'_> {
 
     /// Whether none of the changes would be refused.
     pub fn accepts(&self, changes: &[Change]) -> bool {
-        changes.par_iter().with_min_len(PORTION).all(|change| {
+        changes.par_iter().with_min_len(CHUNK).all(|change| {
             let motion = self.listing.motions.get(change.motion as usize);
             // Whether persistent targets can be edited in place depends on the other changes.
             let is_accepted = |motion: &Motion| {
@@ -104,14 +104,14 @@ impl Task<'_> {
         }
         let guarded = self.guarded[change.motion as usize];
         let written = instruction().and_then(|instruction| written_as(instruction, change));
-        let between = written.map_or(Between::Nothing, |instruction| instruction.between);
-        if guarded || motion.timed || between == Between::Nothing {
+        let inserted = written.map_or(InsertedForm::Nothing, |instruction| instruction.inserted);
+        if guarded || motion.timed || inserted == InsertedForm::Nothing {
             return Some(Reason::NoInsertion);
         }
         for extra in &change.before {
             match (extra.kind, &extra.target) {
                 (MotionKind::Linear | MotionKind::Joint, NewTarget::Cartesian { .. }) => {}
-                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) if between == Between::Plain => {}
+                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) if inserted == InsertedForm::Plain => {}
                 (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) => return Some(Reason::NoJointForm),
                 _ => return Some(Reason::WrongKind),
             }
@@ -131,7 +131,7 @@ struct TargetUpdate {
     change: usize,
     motion: u32,
     target: u32,
-    fresh: Fresh,
+    fresh: NewValue,
 }
 
 /// Updates by declaration and first byte of the literal.
@@ -190,7 +190,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         Rewriter { task, options, edits, names: None, moved_bases: HashSet::new() }
     }
 
-    fn all(&mut self, changes: &[Change]) -> Vec<Outcome> {
+    fn all(&mut self, changes: &[Change]) -> Vec<RewriteOutcome> {
         let task = self.task;
         let (mut outcomes, updates, computed) = self.in_place(changes);
         let replaced: HashSet<(u32, u32)> =
@@ -203,10 +203,10 @@ impl<'r, 's> Rewriter<'r, 's> {
         }
         self.computed(&computed, &mut outcomes);
         for (change, outcome) in changes.iter().zip(&mut outcomes) {
-            if !change.before.is_empty() && !matches!(outcome, Outcome::Refused(_)) {
+            if !change.before.is_empty() && !matches!(outcome, RewriteOutcome::Refused(_)) {
                 self.extras(change);
-                if *outcome == Outcome::Unchanged {
-                    *outcome = Outcome::InPlace;
+                if *outcome == RewriteOutcome::Unchanged {
+                    *outcome = RewriteOutcome::InPlace;
                 }
             }
         }
@@ -215,24 +215,27 @@ impl<'r, 's> Rewriter<'r, 's> {
 
     /// Edits within the instructions, in parallel, since none depends on another. Updates of declared and computed targets are
     /// collected in the order of the changes.
-    fn in_place(&mut self, changes: &[Change]) -> (Vec<Outcome>, UpdatesByDeclaration, Vec<TargetUpdate>) {
+    fn in_place(
+        &mut self,
+        changes: &[Change],
+    ) -> (Vec<RewriteOutcome>, UpdatesByDeclaration, Vec<TargetUpdate>) {
         let (task, options) = (self.task, self.options);
-        let portions: Vec<_> = changes
-            .par_chunks(PORTION)
+        let chunks: Vec<_> = changes
+            .par_chunks(CHUNK)
             .enumerate()
-            .map(|(portion, changes)| {
+            .map(|(chunk, changes)| {
                 let mut part = Rewriter::new(task, options);
                 if let [edits] = &mut part.edits[..] {
                     // Of a target the numbers before the external axes change, some 60 digits.
                     *edits = Edits::with_capacity(changes.len(), 80 * changes.len());
                 }
                 let (mut updates, mut computed) = (UpdatesByDeclaration::new(), Vec::new());
-                let outcomes: Vec<Outcome> = (portion * PORTION..)
+                let outcomes: Vec<RewriteOutcome> = (chunk * CHUNK..)
                     .zip(changes)
                     .map(|(index, change)| match task.listing.motions.get(change.motion as usize) {
-                        None => Outcome::Refused(Reason::MissingArgument),
+                        None => RewriteOutcome::Refused(Reason::MissingArgument),
                         Some(motion) => match task.refusal(motion, change) {
-                            Some(reason) => Outcome::Refused(reason),
+                            Some(reason) => RewriteOutcome::Refused(reason),
                             None => part.one(index, motion, change, &mut updates, &mut computed),
                         },
                     })
@@ -242,7 +245,7 @@ impl<'r, 's> Rewriter<'r, 's> {
             .collect();
         let (mut outcomes, mut updates, mut computed) =
             (Vec::with_capacity(changes.len()), UpdatesByDeclaration::new(), Vec::new());
-        for (edits, mut some, updated, mut left) in portions {
+        for (edits, mut some, updated, mut left) in chunks {
             self.edits.iter_mut().zip(edits).for_each(|(all, some)| all.append(some));
             outcomes.append(&mut some);
             for (place, mut more) in updated {
@@ -261,26 +264,26 @@ impl<'r, 's> Rewriter<'r, 's> {
         change: &Change,
         updates: &mut UpdatesByDeclaration,
         computed: &mut Vec<TargetUpdate>,
-    ) -> Outcome {
-        let mut outcome = Outcome::Unchanged;
+    ) -> RewriteOutcome {
+        let mut outcome = RewriteOutcome::Unchanged;
         if change.straightens() {
             self.straighten(motion);
-            outcome = Outcome::InPlace;
+            outcome = RewriteOutcome::InPlace;
         }
         for (position, (target, new)) in motion.targets.iter().zip(&change.targets).enumerate() {
             let Some(fresh) = fresh(new) else { continue };
             let Ok(old) = target.value else { continue };
             let (motion_index, position) = (change.motion, position as u32);
             let update = TargetUpdate { change: index, motion: motion_index, target: position, fresh };
-            if matches!((&fresh, &old), (Fresh::Joint { .. }, TargetValue::Cartesian(_))) {
+            if matches!((&fresh, &old), (NewValue::Joint { .. }, TargetValue::Cartesian(_))) {
                 self.take_joint_form(motion, target.argument, &old, &fresh);
-                outcome = worse(outcome, Outcome::Inlined);
+                outcome = worse(outcome, RewriteOutcome::Inlined);
                 continue;
             }
             match target.origin {
                 Origin::Inline => {
                     if self.literal(motion.place.file, target.argument, (&old, true), &fresh) {
-                        outcome = worse(outcome, Outcome::InPlace);
+                        outcome = worse(outcome, RewriteOutcome::InPlace);
                     }
                 }
                 Origin::Declared(declaration) => {
@@ -297,7 +300,13 @@ impl<'r, 's> Rewriter<'r, 's> {
     }
 
     /// Replaces the numbers of a literal, or the whole literal where it does not consist of plain numbers. `plain`: it does.
-    fn literal(&mut self, file: u32, span: Span, (old, plain): (&TargetValue, bool), fresh: &Fresh) -> bool {
+    fn literal(
+        &mut self,
+        file: u32,
+        span: Span,
+        (old, plain): (&TargetValue, bool),
+        fresh: &NewValue,
+    ) -> bool {
         let text = &self.task.sources[file as usize][span.range()];
         let edits = &mut self.edits[file as usize];
         let known = Some(old).filter(|_| plain);
@@ -312,7 +321,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         }
     }
 
-    fn inline(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
+    fn inline(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &NewValue) {
         let value = print::merged(old, fresh);
         let edits = &mut self.edits[motion.place.file as usize];
         edits.replace_with(span.range(), |out| print::literal(out, &value, self.options));
@@ -332,7 +341,7 @@ impl<'r, 's> Rewriter<'r, 's> {
     }
 
     /// Changes the instruction to the one that takes joints.
-    fn take_joint_form(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
+    fn take_joint_form(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &NewValue) {
         let Some(name) = instruction_of(motion).and_then(|instruction| instruction.joint_form) else {
             return;
         };
@@ -354,7 +363,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         (index, start): (u32, u32),
         updates: &[TargetUpdate],
         users: &Users,
-        outcomes: &mut [Outcome],
+        outcomes: &mut [RewriteOutcome],
     ) {
         let task = self.task;
         let declaration = &task.listing.declarations[index as usize];
@@ -398,16 +407,16 @@ impl<'r, 's> Rewriter<'r, 's> {
                 free = false;
                 self.literal(declaration.place.file, literal, (&old, false), &group[0].fresh);
                 self.moved_bases.insert(index);
-                Outcome::InPlace
+                RewriteOutcome::InPlace
             } else if declaration.persistent {
                 // A copy would not follow the data.
-                Outcome::Refused(Reason::Persistent)
+                RewriteOutcome::Refused(Reason::Persistent)
             } else if declaration.array {
                 for update in &group {
                     let motion = &task.listing.motions[update.motion as usize];
                     self.inline(motion, target(update).argument, &old, &update.fresh);
                 }
-                Outcome::Inlined
+                RewriteOutcome::Inlined
             } else {
                 let name = self.clone_of(index, &old, &text);
                 for update in &group {
@@ -415,17 +424,17 @@ impl<'r, 's> Rewriter<'r, 's> {
                     let edits = &mut self.edits[motion.place.file as usize];
                     edits.replace(target(update).argument.range(), name.as_bytes());
                 }
-                Outcome::Split(name)
+                RewriteOutcome::Split(name)
             };
             for update in group {
-                let was = std::mem::replace(&mut outcomes[update.change], Outcome::Unchanged);
+                let was = std::mem::replace(&mut outcomes[update.change], RewriteOutcome::Unchanged);
                 outcomes[update.change] = worse(was, outcome.clone());
             }
         }
     }
 
     /// The text of a literal with new values.
-    fn written(&self, text: &[u8], old: &TargetValue, fresh: &Fresh) -> Vec<u8> {
+    fn written(&self, text: &[u8], old: &TargetValue, fresh: &NewValue) -> Vec<u8> {
         let mut edits = Edits::new();
         match print::replace_numbers(text, 0, None, fresh, self.options, &mut edits) {
             Some(_) => edits.apply(text).unwrap_or_else(|_| text.to_vec()),
@@ -501,7 +510,7 @@ impl<'r, 's> Rewriter<'r, 's> {
 
     // ---- computed targets ----
 
-    fn computed(&mut self, updates: &[TargetUpdate], outcomes: &mut [Outcome]) {
+    fn computed(&mut self, updates: &[TargetUpdate], outcomes: &mut [RewriteOutcome]) {
         let task = self.task;
         // A target computed from a changed declaration must be written out even where its own value is unchanged.
         let mut forced: HashSet<(u32, u32)> = HashSet::new();
@@ -527,20 +536,20 @@ impl<'r, 's> Rewriter<'r, 's> {
                 _ => (target.argument, update.fresh),
             };
             self.inline(motion, span, &old, &fresh);
-            let was = std::mem::replace(&mut outcomes[update.change], Outcome::Unchanged);
-            outcomes[update.change] = worse(was, Outcome::Inlined);
+            let was = std::mem::replace(&mut outcomes[update.change], RewriteOutcome::Unchanged);
+            outcomes[update.change] = worse(was, RewriteOutcome::Inlined);
         }
     }
 }
 
 /// The value from which an offset leads to a new one.
-fn before_offset(fresh: Fresh, offset: &Offset) -> Fresh {
+fn before_offset(fresh: NewValue, offset: &Offset) -> NewValue {
     match fresh {
-        Fresh::Cartesian { position_mm, quaternion, conf } => {
+        NewValue::Cartesian { position_mm, quaternion, conf } => {
             let (position_mm, quaternion) = offset.base_of(position_mm, quaternion);
-            Fresh::Cartesian { position_mm, quaternion, conf }
+            NewValue::Cartesian { position_mm, quaternion, conf }
         }
-        Fresh::Joint { .. } => fresh,
+        NewValue::Joint { .. } => fresh,
     }
 }
 
@@ -571,24 +580,24 @@ fn circle_point(source: &[u8], motion: &Motion) -> Option<[std::ops::Range<usize
     None
 }
 
-fn fresh(new: &NewTarget) -> Option<Fresh> {
+fn fresh(new: &NewTarget) -> Option<NewValue> {
     match *new {
         NewTarget::Keep | NewTarget::Drop => None,
         NewTarget::Cartesian { position_mm, quaternion, conf } => {
-            Some(Fresh::Cartesian { position_mm, quaternion, conf })
+            Some(NewValue::Cartesian { position_mm, quaternion, conf })
         }
-        NewTarget::Joint { robot_deg } => Some(Fresh::Joint { robot_deg }),
+        NewTarget::Joint { robot_deg } => Some(NewValue::Joint { robot_deg }),
     }
 }
 
 /// The more significant outcome.
-fn worse(a: Outcome, b: Outcome) -> Outcome {
-    let rank = |outcome: &Outcome| match outcome {
-        Outcome::Unchanged => 0,
-        Outcome::InPlace => 1,
-        Outcome::Split(_) => 2,
-        Outcome::Inlined => 3,
-        Outcome::Refused(_) => 4,
+fn worse(a: RewriteOutcome, b: RewriteOutcome) -> RewriteOutcome {
+    let rank = |outcome: &RewriteOutcome| match outcome {
+        RewriteOutcome::Unchanged => 0,
+        RewriteOutcome::InPlace => 1,
+        RewriteOutcome::Split(_) => 2,
+        RewriteOutcome::Inlined => 3,
+        RewriteOutcome::Refused(_) => 4,
     };
     if rank(&b) > rank(&a) { b } else { a }
 }

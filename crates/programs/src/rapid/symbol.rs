@@ -124,13 +124,13 @@ pub struct RoutineScope {
     pub parameter_writes: Vec<Option<Reason>>,
     /// Side effects of a call.
     pub effects: SideEffects,
-    /// Index into [`Symbols::units`].
-    pub unit: u32,
+    /// Index into [`Symbols::bodies`].
+    pub body: u32,
 }
 
-/// Unit of analysis: a routine, or the statements of a fragment outside routines.
+/// The statements of a routine, or of a fragment outside routines.
 #[derive(Debug, Clone, Copy)]
-pub struct Unit {
+pub struct Body {
     /// Its file.
     pub file: u32,
     /// Its node.
@@ -150,19 +150,19 @@ pub struct Symbols {
     pub scopes: Vec<Scope>,
     /// The routines.
     pub routines: Vec<RoutineScope>,
-    /// All units, in the order of files and lines.
-    pub units: Vec<Unit>,
+    /// All bodies, in the order of files and lines.
+    pub bodies: Vec<Body>,
     /// Whether a routine has the name of a motion instruction.
     pub hides_instruction: bool,
-    /// The symbols that the statements of each unit may write, sorted.
+    /// The symbols that the statements of each body may write, sorted.
     pub written: Vec<Vec<u32>>,
-    /// Post-order of the call graph: each unit after its callees, except along recursive calls.
+    /// Post-order of the call graph: each body after its callees, except along recursive calls.
     pub callees_first: Vec<u32>,
-    /// Whether anything calls each unit by its name.
+    /// Whether anything calls each body by its name.
     pub called: Vec<bool>,
-    /// The calls and functions of each unit that set a switch or call a routine of the program, in order.
+    /// The calls and functions of each body that set a switch or call a routine of the program, in order.
     pub switch_calls: Vec<Vec<u32>>,
-    /// The list of routines that each unit may call by a computed name: index into `late_lists`.
+    /// The list of routines that each body may call by a computed name: index into `late_lists`.
     pub late_list: Vec<u32>,
     /// Those lists, each sorted.
     pub late_lists: Vec<Vec<u32>>,
@@ -262,7 +262,7 @@ impl Symbols {
     }
 
     fn may_use_position(&self) -> bool {
-        self.units.iter().any(|unit| unit.routine.is_none())
+        self.bodies.iter().any(|body| body.routine.is_none())
             || self.routines.iter().any(|routine| routine.effects.uses_position)
     }
 
@@ -272,7 +272,7 @@ impl Symbols {
         late || self
             .routines
             .iter()
-            .any(|routine| routine.effects.moves && self.called[routine.unit as usize])
+            .any(|routine| routine.effects.moves && self.called[routine.body as usize])
     }
 
     /// Whether a routine is the entry of a program.
@@ -290,39 +290,39 @@ impl Symbols {
         scope
     }
 
-    /// The symbols that the statements of a unit may write, sorted.
-    pub fn written_in(&self, unit: Unit) -> &[u32] {
-        self.unit_index(unit).and_then(|at| self.written.get(at)).map_or(&[], Vec::as_slice)
+    /// The symbols that the statements of a body may write, sorted.
+    pub fn written_in(&self, body: Body) -> &[u32] {
+        self.body_index(body).and_then(|at| self.written.get(at)).map_or(&[], Vec::as_slice)
     }
 
-    /// The calls among some nodes of a unit that set a switch or call a routine of the program.
-    pub fn switch_calls_in(&self, unit: Unit, nodes: std::ops::Range<u32>) -> &[u32] {
+    /// The calls among some nodes of a body that set a switch or call a routine of the program.
+    pub fn switch_calls_in(&self, body: Body, nodes: std::ops::Range<u32>) -> &[u32] {
         let all =
-            self.unit_index(unit).and_then(|at| self.switch_calls.get(at)).map_or(&[][..], Vec::as_slice);
+            self.body_index(body).and_then(|at| self.switch_calls.get(at)).map_or(&[][..], Vec::as_slice);
         let first = all.partition_point(|&node| node < nodes.start);
         let end = all.partition_point(|&node| node < nodes.end);
         &all[first..end]
     }
 
-    /// The routines that a unit may call by a computed name.
-    pub fn late_callees_of(&self, unit: Unit) -> &[u32] {
-        self.unit_index(unit).map_or(&[], |at| &self.late_lists[self.late_list[at] as usize])
+    /// The routines that a body may call by a computed name.
+    pub fn late_callees_of(&self, body: Body) -> &[u32] {
+        self.body_index(body).map_or(&[], |at| &self.late_lists[self.late_list[at] as usize])
     }
 
-    /// The switches set by the routines that a unit may call by a computed name.
-    pub fn late_switches_of(&self, unit: Unit) -> SwitchSet {
-        self.unit_index(unit).map_or(SwitchSet::EMPTY, |at| self.late_switches[self.late_list[at] as usize])
+    /// The switches set by the routines that a body may call by a computed name.
+    pub fn late_switches_of(&self, body: Body) -> SwitchSet {
+        self.body_index(body).map_or(SwitchSet::EMPTY, |at| self.late_switches[self.late_list[at] as usize])
     }
 
-    /// The unit of a routine.
-    pub fn unit_of(&self, routine: u32) -> u32 {
-        self.routines[routine as usize].unit
+    /// The body of a routine.
+    pub fn body_of(&self, routine: u32) -> u32 {
+        self.routines[routine as usize].body
     }
 
-    fn unit_index(&self, unit: Unit) -> Option<usize> {
-        match unit.routine {
-            Some(routine) => Some(self.routines[routine as usize].unit as usize),
-            None => self.units.iter().position(|other| (other.file, other.node) == (unit.file, unit.node)),
+    fn body_index(&self, body: Body) -> Option<usize> {
+        match body.routine {
+            Some(routine) => Some(self.routines[routine as usize].body as usize),
+            None => self.bodies.iter().position(|other| (other.file, other.node) == (body.file, body.node)),
         }
     }
 
@@ -385,7 +385,7 @@ impl Symbols {
                 }
                 if inside {
                     self.collect_loop_variables(tree, file, scope, node);
-                    self.units.push(Unit { file, node, scope, routine: None });
+                    self.bodies.push(Body { file, node, scope, routine: None });
                 }
             } else {
                 loose |= !self.item(tree, file, outside, node, "");
@@ -393,7 +393,7 @@ impl Symbols {
         }
         if loose {
             self.collect_loop_variables(tree, file, outside, 0);
-            self.units.push(Unit { file, node: 0, scope: outside, routine: None });
+            self.bodies.push(Body { file, node: 0, scope: outside, routine: None });
         }
     }
 
@@ -469,7 +469,7 @@ impl Symbols {
         let parameter_writes = vec![None; head.parameters.len()];
         let module = module.to_owned();
         let effects = SideEffects::default();
-        let unit = self.units.len() as u32;
+        let body = self.bodies.len() as u32;
         self.routines.push(RoutineScope {
             file,
             head,
@@ -477,9 +477,9 @@ impl Symbols {
             module,
             parameter_writes,
             effects,
-            unit,
+            body,
         });
-        self.units.push(Unit { file, node, scope: inner, routine: Some(index) });
+        self.bodies.push(Body { file, node, scope: inner, routine: Some(index) });
     }
 
     /// The variables of the loops of a fragment, outside routines.

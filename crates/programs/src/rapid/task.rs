@@ -1,7 +1,7 @@
 //! From files to the listing: every motion with its targets, speed, zone, tool and work object.
 //!
-//! [`ListingBuilder`] runs the abstract interpreter ([`super::flow`]) over every unit, lists the motions that it visits, and
-//! solves which switches each unit may be entered with.
+//! [`ListingBuilder`] runs the abstract interpreter ([`super::flow`]) over every body, lists the motions that it visits, and
+//! solves which switches each body may be entered with.
 
 mod call_edges;
 mod entries;
@@ -18,14 +18,14 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::evaluate::{Context, Evaluator};
-use super::flow::{AbstractState, CallSite, Exit, Visitor, interpret_unit};
+use super::flow::{AbstractState, CallSite, Exit, Visitor, interpret_body};
 use super::instruction::INSTRUCTIONS;
 use super::mark;
 use super::modal::SwitchSet;
 use super::parser::parse;
 use super::payload::{self, Gripped};
 use super::reaching_motions::ReachingMotions;
-use super::symbol::{Symbols, Unit};
+use super::symbol::{Body, Symbols};
 use super::syntax::RapidTree;
 use crate::dataflow::Nesting;
 use crate::motion::load::{Load, Loads};
@@ -84,7 +84,7 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Loads, Vec<b
     // Interpretation is sequential; targets written as numbers do not depend on it and are read on the other threads.
     let (mut builder, literals) = rayon::join(
         || {
-            builder.interpret_units();
+            builder.interpret_bodies();
             builder
         },
         || Literals::of(trees, symbols),
@@ -96,7 +96,7 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Loads, Vec<b
     builder.other_uses();
     builder.declared_tools();
     (builder.listing.across_calls, builder.listing.predecessors) =
-        builder.call_edges.solve(symbols, &builder.units, &builder.mains);
+        builder.call_edges.solve(symbols, &builder.bodies, &builder.mains);
     let loads = if symbols.states_loads { builder.loads() } else { Loads::default() };
     (builder.listing, loads, builder.guarded)
 }
@@ -127,7 +127,7 @@ impl<'s> Cached<'s> {
     }
 }
 
-/// Interprets all units and writes the listing. More than twenty fields: its input, each list that it writes, and indices
+/// Interprets all bodies and writes the listing. More than twenty fields: its input, each list that it writes, and indices
 /// over them.
 struct ListingBuilder<'a, 's> {
     trees: &'a [RapidTree<'s>],
@@ -139,9 +139,9 @@ struct ListingBuilder<'a, 's> {
     modal: Vec<SwitchSet>,
     /// Whether the program displacement of each motion is known, and so part of its work object.
     displaced: Vec<bool>,
-    /// The unit of each motion.
-    units: Vec<u32>,
-    unit: u32,
+    /// The body of each motion.
+    bodies: Vec<u32>,
+    body: u32,
     sites: Vec<(u32, CallSite)>,
     call_edges: CallEdges,
     /// What holds at the end of each routine.
@@ -153,10 +153,10 @@ struct ListingBuilder<'a, 's> {
     totals: HashMap<usize, Load>,
     /// Whether a displacement is counted from the end of any motion.
     position_used: bool,
-    /// The units in which one is counted from the robot's position at their entry. A call determines that position; a new cycle,
+    /// The bodies in which one is counted from the robot's position at their entry. A call determines that position; a new cycle,
     /// an interrupt and an unknown caller do not.
     position_used_at_entry: Vec<u32>,
-    /// Decisions by the position whose motions are not all known: unit, whether only those before the unit are open, and place.
+    /// Decisions by the position whose motions are not all known: body, whether only those before the body are open, and place.
     position_decisions: Vec<(u32, bool, Place)>,
     names: Vec<Option<Arc<str>>>,
     /// The line of the last place.
@@ -168,13 +168,13 @@ struct ListingBuilder<'a, 's> {
     zones: Cached<'s>,
     tools: Cached<'s>,
     work_objects: Cached<'s>,
-    /// For each unit, the switches at its calls by computed names, and at its calls of undeclared routines.
+    /// For each body, the switches at its calls by computed names, and at its calls of undeclared routines.
     late: Vec<SwitchSet>,
     outside: Vec<SwitchSet>,
     /// The routines named main.
     mains: Vec<u32>,
     /// The data that every call hands over for a parameter.
-    handed_over: parameters::HandedOver,
+    passed_data: parameters::PassedData,
     /// Whether a target expression of the current motion is impure, so that it must not be replaced.
     impure: bool,
     /// Whether the initial value of a declaration is impure.
@@ -198,7 +198,7 @@ struct Literal {
 }
 
 /// Motions into which one thread inserts literals at a time.
-const PORTION: usize = 4096;
+const CHUNK: usize = 4096;
 
 /// Greatest call depth to which the exit states of routines are computed; beyond it they may be anything that the routine sets.
 const CALL_DEPTH: u32 = 12;
@@ -213,10 +213,10 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             guarded: Vec::new(),
             modal: Vec::new(),
             displaced: Vec::new(),
-            units: Vec::new(),
-            unit: 0,
+            bodies: Vec::new(),
+            body: 0,
             sites: Vec::new(),
-            call_edges: CallEdges::new(symbols.units.len() + symbols.late_lists.len()),
+            call_edges: CallEdges::new(symbols.bodies.len() + symbols.late_lists.len()),
             exits: vec![None; symbols.routines.len()],
             depth: 0,
             grips: Vec::new(),
@@ -232,10 +232,10 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             zones: Cached::default(),
             tools: Cached::default(),
             work_objects: Cached::default(),
-            late: vec![SwitchSet::EMPTY; symbols.units.len()],
-            outside: vec![SwitchSet::EMPTY; symbols.units.len()],
+            late: vec![SwitchSet::EMPTY; symbols.bodies.len()],
+            outside: vec![SwitchSet::EMPTY; symbols.bodies.len()],
             mains: Vec::new(),
-            handed_over: parameters::HandedOver::new(),
+            passed_data: parameters::PassedData::new(),
             impure: false,
             impure_initials: HashMap::new(),
             literals: Vec::new(),
@@ -256,11 +256,11 @@ impl<'a, 's> ListingBuilder<'a, 's> {
         self.guarded.reserve(motions);
         self.modal.reserve(motions);
         self.displaced.reserve(motions);
-        self.units.reserve(motions);
+        self.bodies.reserve(motions);
     }
 
-    /// Interprets every unit.
-    fn interpret_units(&mut self) {
+    /// Interprets every body.
+    fn interpret_bodies(&mut self) {
         self.reserve(
             self.trees.iter().map(|tree| tree.nodes.len() as usize).sum::<usize>() / NODES_PER_MOTION,
         );
@@ -274,28 +274,28 @@ impl<'a, 's> ListingBuilder<'a, 's> {
                 });
             }
         }
-        let units = self.symbols.units.clone();
+        let bodies = self.symbols.bodies.clone();
         let routines = 0..self.symbols.routines.len() as u32;
         self.mains = routines.filter(|&routine| self.symbols.is_main(self.trees, routine)).collect();
-        self.handed_over = parameters::of(self.trees, self.symbols, &self.mains);
+        self.passed_data = parameters::of(self.trees, self.symbols, &self.mains);
         // Exit switches of callees first, however long the chain of calls is.
-        for &unit in &self.symbols.callees_first {
-            let Some(routine) = units[unit as usize].routine else { continue };
+        for &body in &self.symbols.callees_first {
+            let Some(routine) = bodies[body as usize].routine else { continue };
             if self.symbols.effects_of(routine).switches == SwitchSet::EMPTY {
                 let gripped = match self.symbols.states_loads {
                     true => self.exit_of(routine).gripped,
                     false => Some(Gripped::default()),
                 };
                 self.exits[routine as usize] = Some(Exit { modal: SwitchSet::ENTRY, gripped });
-            } else if self.symbols.called[unit as usize] {
+            } else if self.symbols.called[body as usize] {
                 self.exit_of(routine);
             }
         }
-        for (index, unit) in units.iter().enumerate() {
-            self.unit = index as u32;
+        for (index, body) in bodies.iter().enumerate() {
+            self.body = index as u32;
             let evaluator = Evaluator::new(self.trees, self.symbols);
-            let exit = interpret_unit(&evaluator, *unit, self);
-            if let Some(routine) = unit.routine {
+            let exit = interpret_body(&evaluator, *body, self);
+            if let Some(routine) = body.routine {
                 self.exits[routine as usize] = Some(exit);
                 if self.mains.contains(&routine) {
                     // The next cycle begins with the switches and the load at the end of this one.
@@ -308,11 +308,11 @@ impl<'a, 's> ListingBuilder<'a, 's> {
     /// Inserts the targets that are written in the instructions as numbers.
     fn insert_literals(&mut self, read: &Literals) {
         let (literals, trees, symbols) = (std::mem::take(&mut self.literals), self.trees, self.symbols);
-        let portions = self.listing.motions.par_chunks_mut(PORTION).enumerate();
-        portions.for_each(|(portion, motions)| {
+        let chunks = self.listing.motions.par_chunks_mut(CHUNK).enumerate();
+        chunks.for_each(|(chunk, motions)| {
             let evaluator = Evaluator::new(trees, symbols);
             // They are in the order of motions.
-            let begin = portion * PORTION;
+            let begin = chunk * CHUNK;
             let from = literals.partition_point(|literal| (literal.motion as usize) < begin);
             let mut last = 0;
             for literal in &literals[from..] {
@@ -329,7 +329,7 @@ impl<'a, 's> ListingBuilder<'a, 's> {
 impl Visitor for ListingBuilder<'_, '_> {
     fn visit_call(
         &mut self,
-        unit: Unit,
+        body: Body,
         node: u32,
         known: Option<usize>,
         state: &AbstractState,
@@ -338,25 +338,25 @@ impl Visitor for ListingBuilder<'_, '_> {
         if self.depth > 0 {
             return None;
         }
-        let tree = &self.trees[unit.file as usize];
+        let tree = &self.trees[body.file as usize];
         let motion = match known {
-            Some(known) => Some(self.table_motion(unit, node, state, nesting, known)),
-            None => self.other_motion(unit, node, state, nesting),
+            Some(known) => Some(self.table_motion(body, node, state, nesting, known)),
+            None => self.other_motion(body, node, state, nesting),
         };
         let Some(motion) = motion else {
-            self.record_outside_call(unit, node);
+            self.record_outside_call(body, node);
             return None;
         };
         let index = self.listing.motions.len() as u32;
-        self.call_edges.arrive(self.unit, index, motion.previous.is_none(), &state.reaching);
+        self.call_edges.arrive(self.body, index, motion.previous.is_none(), &state.reaching);
         self.listing.motions.push(motion);
         self.guarded.push(nesting.guarded);
         self.modal.push(state.modal);
         self.displaced.push(matches!(state.displacement(), Some(Ok(_))));
-        self.units.push(self.unit);
+        self.bodies.push(self.body);
         if self.symbols.states_loads {
             self.grips.push(if state.reachable { state.gripped } else { Gripped::UNKNOWN });
-            let context = Context::new(unit.file, unit.scope, &state.known);
+            let context = Context::new(body.file, body.scope, &state.known);
             let total = payload::total_load(&self.evaluator, context, tree, node).filter(|_| state.reachable);
             self.totals.extend(total.map(|total| (self.listing.motions.len() - 1, total)));
         }
@@ -376,8 +376,8 @@ impl Visitor for ListingBuilder<'_, '_> {
         // Assumed for recursive calls while the routine is interpreted.
         self.exits[routine as usize] = Some(any);
         self.depth += 1;
-        let unit = self.symbols.units[self.symbols.unit_of(routine) as usize];
-        let exit = interpret_unit(&Evaluator::new(self.trees, self.symbols), unit, self);
+        let body = self.symbols.bodies[self.symbols.body_of(routine) as usize];
+        let exit = interpret_body(&Evaluator::new(self.trees, self.symbols), body, self);
         self.depth -= 1;
         self.exits[routine as usize] = Some(exit);
         exit
@@ -385,7 +385,7 @@ impl Visitor for ListingBuilder<'_, '_> {
 
     fn record_call(&mut self, site: CallSite) {
         if self.depth == 0 {
-            self.sites.push((self.unit, site));
+            self.sites.push((self.body, site));
         }
     }
 
@@ -393,19 +393,19 @@ impl Visitor for ListingBuilder<'_, '_> {
         if self.depth > 0 {
             return 0;
         }
-        self.call_edges.call(self.unit, self.symbols.unit_of(routine), before)
+        self.call_edges.call(self.body, self.symbols.body_of(routine), before)
     }
 
     fn record_moving_late_call(&mut self, before: &ReachingMotions) -> u32 {
         if self.depth > 0 {
             return 0;
         }
-        let list = self.symbols.units.len() as u32 + self.symbols.late_list[self.unit as usize];
-        self.call_edges.call(self.unit, list, before)
+        let list = self.symbols.bodies.len() as u32 + self.symbols.late_list[self.body as usize];
+        self.call_edges.call(self.body, list, before)
     }
 
     fn record_loop(&mut self) -> u32 {
-        if self.depth > 0 { 0 } else { self.call_edges.begin_loop(self.unit) }
+        if self.depth > 0 { 0 } else { self.call_edges.begin_loop(self.body) }
     }
 
     fn record_loop_end(&mut self, iteration: u32, reaching: &ReachingMotions) {
@@ -416,20 +416,20 @@ impl Visitor for ListingBuilder<'_, '_> {
 
     fn record_end(&mut self, reaching: &ReachingMotions) {
         if self.depth == 0 {
-            self.call_edges.end(self.unit, reaching);
+            self.call_edges.end(self.body, reaching);
         }
     }
 
     fn record_late_call(&mut self, modal: SwitchSet) {
         if self.depth == 0 {
-            let late = &mut self.late[self.unit as usize];
+            let late = &mut self.late[self.body as usize];
             *late = late.join(modal);
         }
     }
 
     fn record_external_call(&mut self, modal: SwitchSet) {
         if self.depth == 0 {
-            let outside = &mut self.outside[self.unit as usize];
+            let outside = &mut self.outside[self.body as usize];
             *outside = outside.join(modal);
         }
     }
@@ -449,11 +449,11 @@ impl Visitor for ListingBuilder<'_, '_> {
             None => self.position_used = true,
         }
         if standing.entry {
-            self.position_used_at_entry.push(self.unit);
+            self.position_used_at_entry.push(self.body);
         }
     }
 
-    fn record_position_decision(&mut self, unit: Unit, node: u32, standing: &ReachingMotions) {
+    fn record_position_decision(&mut self, body: Body, node: u32, standing: &ReachingMotions) {
         if self.depth > 0 {
             return;
         }
@@ -463,12 +463,12 @@ impl Visitor for ListingBuilder<'_, '_> {
             }
         }
         if standing.motions().is_none() || standing.entry || standing.elsewhere {
-            let tree = &self.trees[unit.file as usize];
+            let tree = &self.trees[body.file as usize];
             let (line, column) = tree.line_column(tree.start(tree.nodes.first(node)));
             self.position_decisions.push((
-                self.unit,
+                self.body,
                 standing.entry,
-                Place { file: unit.file, line, column },
+                Place { file: body.file, line, column },
             ));
         }
     }

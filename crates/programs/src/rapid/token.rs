@@ -15,10 +15,10 @@ macro_rules! tokens {
             /// alone.
             const LENGTHS: [u16; 32] = lengths(&[$($text,)*]);
             let first = text.first().filter(|byte| byte.is_ascii_alphabetic())?;
-            if text.len() > LONGEST || (LENGTHS[usize::from(first & 31)] >> text.len()) & 1 == 0 {
+            if text.len() > MAX_WORD_BYTES || (LENGTHS[usize::from(first & 31)] >> text.len()) & 1 == 0 {
                 return None;
             }
-            let mut folded = [0_u8; LONGEST];
+            let mut folded = [0_u8; MAX_WORD_BYTES];
             let folded = folded.get_mut(..text.len())?;
             folded.copy_from_slice(text);
             folded.make_ascii_uppercase();
@@ -31,7 +31,7 @@ macro_rules! tokens {
 }
 
 /// Bytes of the longest reserved word.
-const LONGEST: usize = 9;
+const MAX_WORD_BYTES: usize = 9;
 
 const fn lengths(words: &[&[u8]]) -> [u16; 32] {
     let mut out = [0; 32];

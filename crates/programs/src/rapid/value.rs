@@ -4,8 +4,8 @@ use truegrind_math::option_f64::OptionF64;
 use truegrind_math::rounding::round;
 
 use crate::motion::{
-    FARTHEST_MM, Frame, JointTarget, Reason, RobTarget, SpeedValue, TargetValue, ToolValue, WorkObjectValue,
-    ZoneValue,
+    Frame, JointTarget, MAX_POSITION_MM, Reason, RobTarget, SpeedValue, TargetValue, ToolValue,
+    WorkObjectValue, ZoneValue,
 };
 
 /// A value, known completely or in part.
@@ -25,11 +25,11 @@ pub enum Value {
 }
 
 /// The largest number of a controller: num is of single precision.
-pub const LARGEST: f64 = f32::MAX as f64;
+pub const MAX_NUM: f64 = f32::MAX as f64;
 
 /// Whether a controller can represent these numbers.
 pub fn held(numbers: &[f64]) -> Result<(), Reason> {
-    if numbers.iter().all(|number| number.abs() <= LARGEST) { Ok(()) } else { Err(Reason::NumberRange) }
+    if numbers.iter().all(|number| number.abs() <= MAX_NUM) { Ok(()) } else { Err(Reason::NumberRange) }
 }
 
 /// From this size on an external axis is "not connected" (9E9).
@@ -182,7 +182,11 @@ pub fn usable(quaternion: &[f64; 4]) -> Result<(), Reason> {
 
 /// Whether numbers (mm, °, kg) are plausible for an arm.
 pub fn within_reach(numbers: &[f64]) -> Result<(), Reason> {
-    if numbers.iter().all(|number| number.abs() <= FARTHEST_MM) { Ok(()) } else { Err(Reason::BeyondReach) }
+    if numbers.iter().all(|number| number.abs() <= MAX_POSITION_MM) {
+        Ok(())
+    } else {
+        Err(Reason::BeyondReach)
+    }
 }
 
 fn external(values: [f64; 6]) -> [OptionF64; 6] {

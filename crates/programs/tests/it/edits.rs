@@ -36,7 +36,7 @@ fn overlapping_and_outlying_edits_are_errors() {
 }
 
 #[test]
-fn a_hundred_thousand_edits_are_applied_in_portions() {
+fn a_hundred_thousand_edits_are_applied_in_chunks() {
     let source: Vec<u8> = (0..1_000_000_u32).map(|at| b'a' + (at % 26) as u8).collect();
     let (mut edits, mut expected, mut last) = (Edits::new(), Vec::new(), 0);
     for edit in 0..100_000_usize {

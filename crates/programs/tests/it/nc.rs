@@ -11,7 +11,7 @@ use truegrind_programs::nc::orientation::{Angles, spun, vector_and_spin};
 use truegrind_programs::nc::parser::parse;
 use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::nc::{Task, mark};
-use truegrind_programs::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOptions, Rewritten};
+use truegrind_programs::rewrite::{Change, Extra, NewTarget, RewriteOptions, RewriteOutcome, Rewritten};
 
 use super::samples::{root, told};
 
@@ -427,7 +427,7 @@ fn words_keep_their_place_and_omitted_ones_are_added() {
         format!("{HEAD}N10 G1 X1 Y2. Z3.00 A0 B0 C0 F100 ; begin\nN20 X 5.5\nN30 M8\nN40 Y-7 (cool)\n");
     let (text, rewritten) =
         rewrite_as(&source, Dialect::LinuxCnc, |listing| vec![change_of(listing, 1, [0.25, 0.125, 0.0])]);
-    assert_eq!(rewritten.outcomes, [Outcome::InPlace]);
+    assert_eq!(rewritten.outcomes, [RewriteOutcome::InPlace]);
     // X in place with enough decimals, Y added; the next, unmodified motion restates X and continues with its own Y.
     let expected = source.replace("X 5.5", "X 5.7500 Y2.1250").replace("Y-7", "X5.5000 Y-7");
     assert_eq!(text, expected);
@@ -483,7 +483,7 @@ fn round_trip(name: &str, bytes: &[u8], setup: &Setup, by: [f64; 3], turn_deg: f
             format!("{name}:{}: {}", old.place.line, String::from_utf8_lossy(&text[new.statement.range()]));
         let change =
             changes.iter().zip(&rewritten.outcomes).find(|(change, _)| change.motion == index as u32);
-        let refused = change.is_some_and(|(_, outcome)| matches!(outcome, Outcome::Refused(_)));
+        let refused = change.is_some_and(|(_, outcome)| matches!(outcome, RewriteOutcome::Refused(_)));
         let change = change.filter(|_| !refused).map(|(change, _)| change);
         if old.own_reason.is_some() && old.own_reason == new.own_reason {
             continue;
@@ -532,8 +532,8 @@ fn arcs_get_a_centre_that_fits_both_ends() {
         let (text, rewritten) =
             rewrite_as(&source, Dialect::LinuxCnc, |listing| moved(listing, [0.25, 0.5, 0.0]));
         // A full circle moves with its start: nothing in its block changes.
-        let fine = |(at, outcome): (usize, &Outcome)| {
-            *outcome == Outcome::InPlace || at == 1 && body.starts_with("G2 I")
+        let fine = |(at, outcome): (usize, &RewriteOutcome)| {
+            *outcome == RewriteOutcome::InPlace || at == 1 && body.starts_with("G2 I")
         };
         assert!(rewritten.outcomes.iter().enumerate().all(fine), "{text} {:?}", rewritten.outcomes);
         let task = Task::read(
@@ -585,7 +585,7 @@ fn computed_words_become_literals() {
     let listing = listing_of("#1=2\nG1 X[#1*2] Y1 Z#1 A0 B0 C0\n", Dialect::LinuxCnc);
     assert_eq!(listing.motions[0].targets[0].origin, Origin::Computed);
     let (text, rewritten) = rewrite_as(&source, Dialect::LinuxCnc, |listing| moved(listing, [0.5, 0.0, 0.0]));
-    assert_eq!(rewritten.outcomes, [Outcome::Inlined]);
+    assert_eq!(rewritten.outcomes, [RewriteOutcome::Inlined]);
     assert_eq!(text, source.replace("X[#1*2]", "X4.5000"));
 }
 

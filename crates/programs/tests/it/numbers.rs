@@ -6,7 +6,7 @@ use truegrind_programs::nc;
 use truegrind_programs::nc::dialect::Dialect;
 use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::rapid::Task;
-use truegrind_programs::rewrite::{Change, NewTarget, Outcome, RewriteOptions};
+use truegrind_programs::rewrite::{Change, NewTarget, RewriteOptions, RewriteOutcome};
 
 const EXT: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
 
@@ -63,7 +63,7 @@ fn no_number_beyond_the_range_of_a_control_is_written() {
             NewTarget::Cartesian { position_mm: [x, 0.0, 0.0], quaternion: [0.0, 0.0, q, 0.0], conf: None };
         let change = Change { motion: 0, targets: [new].into(), before: vec![] };
         let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
-        assert_eq!(rewritten.outcomes, [Outcome::Refused(Reason::NumberRange)], "{x} {q}");
+        assert_eq!(rewritten.outcomes, [RewriteOutcome::Refused(Reason::NumberRange)], "{x} {q}");
         assert!(rewritten.files[0].edits.is_empty());
     }
 }

@@ -3,7 +3,7 @@
 
 use truegrind_programs::motion::{MotionKind, Origin, Reason, RobTarget};
 use truegrind_programs::rapid::Task;
-use truegrind_programs::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOptions};
+use truegrind_programs::rewrite::{Change, Extra, NewTarget, RewriteOptions, RewriteOutcome};
 
 const EXT: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
 
@@ -18,7 +18,7 @@ fn moved(position_mm: [f64; 3]) -> NewTarget {
     NewTarget::Cartesian { position_mm, quaternion: [0.5, 0.5, -0.5, 0.5], conf: None }
 }
 
-fn rewritten(source: &str, motion: u32, target: NewTarget) -> (String, Outcome) {
+fn rewritten(source: &str, motion: u32, target: NewTarget) -> (String, RewriteOutcome) {
     let task = Task::read(&[("m.mod", source.as_bytes())]);
     let change = Change { motion, targets: [target].into(), before: Vec::new() };
     let mut done = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
@@ -45,7 +45,7 @@ fn an_offset_by_persistent_data_remains() {
         assert!(matches!(target.origin, Origin::Offset(_)), "{expression}");
         // Written for the value of the file, the target that the controller computes is the new one.
         let (out, outcome) = rewritten(&text, 0, moved([501.5, -20.25, 304.0]));
-        assert_eq!(outcome, Outcome::Inlined);
+        assert_eq!(outcome, RewriteOutcome::Inlined);
         assert!(out.contains(kept), "{out}");
         let again = Task::read(&[("m.mod", out.as_bytes())]);
         let found = first(&again);
@@ -102,11 +102,11 @@ fn nothing_is_inserted_beside_and_no_joints_are_written() {
         let change = Change { motion, targets: [NewTarget::Keep].into(), before: vec![between()] };
         task.rewrite(&[change], &RewriteOptions::default()).unwrap().outcomes.remove(0)
     };
-    assert_eq!(refusal(0), Outcome::Refused(Reason::NoInsertion));
-    assert_eq!(refusal(1), Outcome::Refused(Reason::NoInsertion));
-    assert_eq!(refusal(2), Outcome::InPlace);
+    assert_eq!(refusal(0), RewriteOutcome::Refused(Reason::NoInsertion));
+    assert_eq!(refusal(1), RewriteOutcome::Refused(Reason::NoInsertion));
+    assert_eq!(refusal(2), RewriteOutcome::InPlace);
     let joints = NewTarget::Joint { robot_deg: [0.0; 6] };
-    assert_eq!(rewritten(&text, 0, joints).1, Outcome::Refused(Reason::Persistent));
+    assert_eq!(rewritten(&text, 0, joints).1, RewriteOutcome::Refused(Reason::Persistent));
 }
 
 /// Elements, components and records count as persistent, too, and so does the base of an offset.
@@ -127,7 +127,7 @@ fn whatever_part_of_persistent_data_is_read_never_becomes_a_number() {
     ] {
         let text = source(&format!("MoveL {offset},v100,fine,tool0;"));
         let (out, outcome) = rewritten(&text, 0, moved([501.5, -20.25, 304.0]));
-        assert_eq!(outcome, Outcome::Inlined, "{offset}");
+        assert_eq!(outcome, RewriteOutcome::Inlined, "{offset}");
         assert!(out.contains(&offset[offset.find(',').unwrap()..]), "{out}");
     }
     for lines in [
@@ -153,13 +153,17 @@ fn a_persistent_target_is_changed_where_it_is_declared_or_not_at_all() {
     let source = |lines: &str| source(lines).replace("PROC main()", &declared);
     let alone = source("MoveL pp,v100,fine,tool0;");
     let (out, outcome) = rewritten(&alone, 0, moved([501.5, -20.25, 304.0]));
-    assert_eq!(outcome, Outcome::InPlace);
+    assert_eq!(outcome, RewriteOutcome::InPlace);
     assert!(out.contains("PERS robtarget pp:=[[501.5") && out.contains("MoveL pp,"), "{out}");
     // Another reader needs the old value, and a copy would not follow the data.
     for other in ["now:=pp;", "MoveL Offs(pp,0,0,5),v100,fine,tool0;", "MoveL pp,v100,fine,tool0;"] {
         let text = source(&format!("MoveL pp,v100,fine,tool0;\n{other}"));
         let (out, outcome) = rewritten(&text, 0, moved([501.5, -20.25, 304.0]));
-        assert_eq!((outcome, out == text), (Outcome::Refused(Reason::Persistent), true), "{other}: {out}");
+        assert_eq!(
+            (outcome, out == text),
+            (RewriteOutcome::Refused(Reason::Persistent), true),
+            "{other}: {out}"
+        );
     }
     // Two motions that need two values: the second would follow the first's.
     let twice = source("MoveL pp,v100,fine,tool0;\nMoveL pp,v100,fine,tool0;");
@@ -173,15 +177,15 @@ fn a_persistent_target_is_changed_where_it_is_declared_or_not_at_all() {
         let done = task.rewrite(&[change(0, x[0]), change(1, x[1])], &RewriteOptions::default()).unwrap();
         (done.outcomes, done.files[0].edits.apply(twice.as_bytes()).unwrap() == twice.as_bytes())
     };
-    assert_eq!(both([501.5, 501.5]), (vec![Outcome::InPlace; 2], false));
-    assert_eq!(both([501.5, 501.4]), (vec![Outcome::Refused(Reason::Persistent); 2], true));
+    assert_eq!(both([501.5, 501.5]), (vec![RewriteOutcome::InPlace; 2], false));
+    assert_eq!(both([501.5, 501.4]), (vec![RewriteOutcome::Refused(Reason::Persistent); 2], true));
     // Neither do joints in its place, nor a target inserted beside it.
     let joints = NewTarget::Joint { robot_deg: [0.0; 6] };
-    assert_eq!(rewritten(&alone, 0, joints).1, Outcome::Refused(Reason::Persistent));
+    assert_eq!(rewritten(&alone, 0, joints).1, RewriteOutcome::Refused(Reason::Persistent));
     let two = source("MoveL p,v100,fine,tool0;\nMoveL pp,v100,fine,tool0;");
     let task = Task::read(&[("m.mod", two.as_bytes())]);
     let extra = Extra { kind: MotionKind::Linear, target: moved([500.0, -20.0, 299.0]), external: None };
     let change = Change { motion: 1, targets: [moved([501.5, -20.25, 304.0])].into(), before: vec![extra] };
     let done = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
-    assert_eq!(done.outcomes, [Outcome::Refused(Reason::NoInsertion)]);
+    assert_eq!(done.outcomes, [RewriteOutcome::Refused(Reason::NoInsertion)]);
 }

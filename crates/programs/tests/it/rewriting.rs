@@ -4,7 +4,7 @@ use truegrind_programs::motion::{Mark, MotionKind, Reason, TargetValue};
 use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::rapid::Task;
 use truegrind_programs::reading::Program;
-use truegrind_programs::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOptions, Rewritten};
+use truegrind_programs::rewrite::{Change, Extra, NewTarget, RewriteOptions, RewriteOutcome, Rewritten};
 
 use super::samples::{groups, read};
 
@@ -37,7 +37,7 @@ fn only_numbers_that_change_are_replaced_with_enough_decimals() {
         &format!("  MoveL [ [500 , -100.5,3E2],[0,0,1,0] ,[0,0,0,0],{EXT}] , v100,fine,tool0; ! keep\n"),
     );
     let (text, rewritten) = rewrite(&source, &[change(0, at(500.125, -100.5, 299.000_04))]);
-    assert_eq!(rewritten.outcomes, [Outcome::InPlace]);
+    assert_eq!(rewritten.outcomes, [RewriteOutcome::InPlace]);
     assert_eq!(text, source.replace("500 ,", "500.1250 ,").replace("3E2", "299.0000"));
 
     // More decimals in the source than requested are kept; a sign goes with its number; no -0.
@@ -73,7 +73,7 @@ fn a_shared_declaration_is_edited_once_where_all_agree() {
     let source = module(&data, "  MoveJ p,v100,fine,tool0;\n  MoveL p,v50,fine,tool0;\n");
     let (text, rewritten) =
         rewrite(&source, &[change(0, at(501.0, 0.0, 300.0)), change(1, at(501.0, 0.0, 300.0))]);
-    assert_eq!(rewritten.outcomes, [Outcome::InPlace, Outcome::InPlace]);
+    assert_eq!(rewritten.outcomes, [RewriteOutcome::InPlace, RewriteOutcome::InPlace]);
     assert_eq!(rewritten.files[0].edits.len(), 1);
     assert_eq!(text, source.replace("[500,", "[501.0000,"));
 }
@@ -93,7 +93,10 @@ fn a_shared_declaration_is_split_where_uses_differ() {
             rewrite(&source, &[change(1, at(501.0, 0.0, 300.0)), change(2, at(501.0, 0.0, 300.0))]);
         let name = "pWithANameOfNearlyThirtyTwoCha_2".to_owned();
         assert_eq!(name.len(), 32);
-        assert_eq!(rewritten.outcomes, [Outcome::Split(name.clone()), Outcome::Split(name.clone())]);
+        assert_eq!(
+            rewritten.outcomes,
+            [RewriteOutcome::Split(name.clone()), RewriteOutcome::Split(name.clone())]
+        );
         let clone = format!(
             "{comment}\n  {local}CONST robtarget {name}:=[[501.0000,0,300],[0,0,1,0],[0,0,0,0],{EXT}];\nPROC"
         );
@@ -108,7 +111,7 @@ fn a_shared_declaration_is_split_where_uses_differ() {
             change(2, at(503.0, 0.0, 300.0)),
         ];
         let (text, rewritten) = rewrite(&source, &changes);
-        assert_eq!(rewritten.outcomes[0], Outcome::InPlace);
+        assert_eq!(rewritten.outcomes[0], RewriteOutcome::InPlace);
         let again = Task::read(&[("m.mod", text.as_bytes())]);
         let x: Vec<f64> = again
             .listing
@@ -126,7 +129,7 @@ fn a_declaration_with_other_uses_is_unmodified_and_the_motion_gets_a_clone() {
     let source =
         module(&data, "  MoveL p,v100,fine,tool0;\n  MoveL Offs(p,i,0,0),v50,fine,tool0;\n  i:=2;\n");
     let (text, rewritten) = rewrite(&source, &[change(0, at(501.0, 0.0, 300.0))]);
-    assert_eq!(rewritten.outcomes, [Outcome::Split("p_2".into())]);
+    assert_eq!(rewritten.outcomes, [RewriteOutcome::Split("p_2".into())]);
     assert!(text.contains("CONST robtarget p:=[[500,0,300]") && text.contains("MoveL p_2,v100"), "{text}");
 }
 
@@ -136,7 +139,7 @@ fn a_computed_target_becomes_a_literal_even_where_only_its_base_moves() {
     let source = module(&data, "  MoveL p,v100,fine,tool0;\n  MoveL Offs(p,10,0,-5),v50,fine,tool0;\n");
     let (text, rewritten) =
         rewrite(&source, &[change(0, at(501.0, 0.0, 300.0)), change(1, at(510.0, 0.0, 295.0))]);
-    assert_eq!(rewritten.outcomes, [Outcome::InPlace, Outcome::Inlined]);
+    assert_eq!(rewritten.outcomes, [RewriteOutcome::InPlace, RewriteOutcome::Inlined]);
     let literal = "[[510.0000,0.0000,295.0000],[0.0000000,0.0000000,1.0000000,0.0000000],[0,1,2,3],[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]]";
     assert_eq!(text, source.replace("[500,", "[501.0000,").replace("Offs(p,10,0,-5)", literal));
 }
@@ -155,7 +158,10 @@ fn array_elements_change_in_place_or_in_the_instruction() {
         change(2, at(602.0, 0.0, 300.0)),
     ];
     let (text, rewritten) = rewrite(&source, &changes);
-    assert_eq!(rewritten.outcomes, [Outcome::InPlace, Outcome::InPlace, Outcome::Inlined]);
+    assert_eq!(
+        rewritten.outcomes,
+        [RewriteOutcome::InPlace, RewriteOutcome::InPlace, RewriteOutcome::Inlined]
+    );
     assert!(text.contains("[501.0000,0,300]") && text.contains("[601.0000,0,300]"));
     assert!(text.contains("MoveL [[602.0000,0.0000,300.0000]"), "{text}");
 }
@@ -168,7 +174,7 @@ fn a_linear_motion_can_be_rewritten_in_joints() {
     );
     let joints = NewTarget::Joint { robot_deg: [1.0, -2.5, 3.123_456_78, 0.0, 90.0, -0.000_000_01] };
     let (text, rewritten) = rewrite(&source, &[change(0, joints)]);
-    assert_eq!(rewritten.outcomes, [Outcome::Inlined]);
+    assert_eq!(rewritten.outcomes, [RewriteOutcome::Inlined]);
     let line = "  MoveAbsJ [[1.000000,-2.500000,3.123457,0.000000,90.000000,0.000000],[100,9E+09,9E+09,9E+09,9E+09,9E+09]],v100,z5,tool0\\WObj:=wobj0;\n";
     assert_eq!(text, module("", line));
 }
@@ -179,7 +185,7 @@ fn a_named_argument_takes_its_name_in_the_joint_form() {
     let value = "[[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
     let joints = NewTarget::Joint { robot_deg: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
     let (text, rewritten) = rewrite(&module("", &line("MoveJ ToPoint", value)), &[change(0, joints)]);
-    assert_eq!(rewritten.outcomes, [Outcome::Inlined]);
+    assert_eq!(rewritten.outcomes, [RewriteOutcome::Inlined]);
     let told =
         "[[1.000000,2.000000,3.000000,4.000000,5.000000,6.000000],[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]]";
     assert_eq!(text, module("", &line("MoveAbsJ ToJointPos", told)));
@@ -195,7 +201,7 @@ fn instructions_that_set_a_signal_have_no_joint_form() {
         let (text, rewritten) = rewrite(&source, &[change(0, joints)]);
         assert_eq!(
             (rewritten.outcomes, text),
-            (vec![Outcome::Refused(Reason::NoJointForm)], source),
+            (vec![RewriteOutcome::Refused(Reason::NoJointForm)], source),
             "{name}"
         );
     }
@@ -229,7 +235,7 @@ fn extra_motions_take_over_speed_tool_and_process() {
         let source = module(data, &format!("    {line} ! end\n"));
         let change = Change { motion: 0, targets: Default::default(), before: vec![extra.clone()] };
         let (text, rewritten) = rewrite(&source, &[change]);
-        assert_eq!(rewritten.outcomes, [Outcome::InPlace]);
+        assert_eq!(rewritten.outcomes, [RewriteOutcome::InPlace]);
         let inserted = inserted.replace("TARGET", target);
         assert_eq!(text, module(data, &format!("    {inserted}\n    {line} ! end\n")));
     }
@@ -256,7 +262,7 @@ fn impossible_changes_are_refused_with_their_reason() {
     for (line, targets, before, reason) in cases {
         let source = module("", &format!("  {line}\n"));
         let (text, rewritten) = rewrite(&source, &[Change { motion: 0, targets: targets.into(), before }]);
-        assert_eq!(rewritten.outcomes, [Outcome::Refused(reason)], "{line}");
+        assert_eq!(rewritten.outcomes, [RewriteOutcome::Refused(reason)], "{line}");
         assert_eq!(text, source);
     }
 }
@@ -371,9 +377,12 @@ fn every_sample_reads_back_what_was_written() {
         for (index, (before, after)) in task.listing.motions.iter().zip(&again.listing.motions).enumerate() {
             let refused = before.reason();
             match &rewritten.outcomes[index] {
-                Outcome::Refused(reason) => assert_eq!(Some(*reason), refused, "{name}"),
+                RewriteOutcome::Refused(reason) => assert_eq!(Some(*reason), refused, "{name}"),
                 other => {
-                    assert!(refused.is_none() && *other != Outcome::Unchanged, "{name} {index} {other:?}")
+                    assert!(
+                        refused.is_none() && *other != RewriteOutcome::Unchanged,
+                        "{name} {index} {other:?}"
+                    )
                 }
             }
             for (target, (old, new)) in before.targets.iter().zip(&after.targets).enumerate() {
@@ -421,7 +430,7 @@ fn twenty_thousand_targets_on_one_line_take_linear_time() {
         .map(|motion| change(motion, at(f64::from(motion % 10_000) + 0.5, 0.0, 300.0)))
         .collect();
     let rewritten = task.rewrite(&changes, &RewriteOptions::default()).unwrap();
-    assert!(rewritten.outcomes.iter().all(|outcome| *outcome == Outcome::InPlace));
+    assert!(rewritten.outcomes.iter().all(|outcome| *outcome == RewriteOutcome::InPlace));
     let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
     let again = Task::read(&[("m.mod", &text)]);
     for (index, motion) in again.listing.motions.iter().enumerate() {

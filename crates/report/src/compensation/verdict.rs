@@ -1,11 +1,11 @@
 //! Verdict and key figures of a compensation: may the program run, what are the deviations before and after, what remains to do.
 
 use crate::deviation::status_word;
-use crate::document::{KeyFigure, Verdict};
+use crate::document::{KeyFigure, PageVerdict};
 use crate::placement::{self, BeforeAndAfter};
 use crate::status::Status;
 use truegrind_calibration::identification::verdict::percent_of;
-use truegrind_compensation::deviation::Status as MotionStatus;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::steps_to_left::is_path;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
@@ -16,9 +16,9 @@ const STATUSES: [MotionStatus; 4] =
     [MotionStatus::Changed, MotionStatus::Flagged, MotionStatus::Refused, MotionStatus::Left];
 
 /// Verdict on a compensation, the same on the terminal, on the page and in the exit code. `is_written`: the corrected program is.
-pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
+pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> PageVerdict {
     let (status, headline) = headline(plan, listing, is_written);
-    Verdict::new(status, headline, reasons(plan, listing))
+    PageVerdict::new(status, headline, reasons(plan, listing))
 }
 
 /// The first that holds.

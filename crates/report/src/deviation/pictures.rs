@@ -9,7 +9,7 @@ use crate::plot::{
     Axis, ColorMap, Graph, HeatStrip, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span, Strip,
     distinguishable,
 };
-use truegrind_compensation::deviation::{After, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{After, MotionStatus, PathPoint, PathReport};
 
 /// Largest number of plotted points; of each group of neighbours the largest deviation is kept.
 const POINTS: usize = 2000;
@@ -274,16 +274,16 @@ fn thinned(report: &PathReport, side: Side) -> Vec<&PathPoint> {
 
 /// Ranges of points that were refused, flagged or left; empty if no point was changed.
 fn spans(report: &PathReport) -> Vec<Span> {
-    if report.points.iter().all(|point| point.status != Status::Changed) {
+    if report.points.iter().all(|point| point.status != MotionStatus::Changed) {
         return Vec::new();
     }
     let mut out: Vec<Span> = Vec::new();
     for point in &report.points {
         let name = match point.status {
-            Status::Changed => continue,
-            Status::Refused => "refused",
-            Status::Flagged => "flagged",
-            Status::Left => "left",
+            MotionStatus::Changed => continue,
+            MotionStatus::Refused => "refused",
+            MotionStatus::Flagged => "flagged",
+            MotionStatus::Left => "left",
         };
         let (from, to) = (point.index as f64 - 0.5, point.index as f64 + 0.5);
         match out.last_mut() {

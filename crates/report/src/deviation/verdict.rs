@@ -2,10 +2,10 @@
 
 use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
-use crate::document::Verdict;
+use crate::document::PageVerdict;
 use crate::status::Status;
 use truegrind_compensation::deviation::{
-    BetweenTargets, MissingMotions, PathPoint, PathReport, Status as MotionStatus,
+    BetweenTargets, MissingMotions, MotionStatus, PathPoint, PathReport,
 };
 use truegrind_compensation::line_list::numbered;
 use truegrind_programs::motion::Place;
@@ -25,7 +25,7 @@ pub(crate) enum Risk {
 }
 
 /// The verdict on one program under all models.
-pub(super) fn verdict(reports: &[&PathReport], risk: Risk) -> Verdict {
+pub(super) fn verdict(reports: &[&PathReport], risk: Risk) -> PageVerdict {
     let judged: Vec<Judged<'_>> = reports
         .iter()
         .filter_map(|report| Some((*report, largest(report, BEFORE)?, largest(report, AFTER)?)))
@@ -52,9 +52,9 @@ pub(super) fn verdict(reports: &[&PathReport], risk: Risk) -> Verdict {
         );
     }
     if let Some(report) = reports.iter().find(|report| !report.differences.is_empty()) {
-        return Verdict::new(Status::Bad, OTHER_PROGRAM.to_owned(), different(report, reasons));
+        return PageVerdict::new(Status::Bad, OTHER_PROGRAM.to_owned(), different(report, reasons));
     }
-    Verdict::new(status, headline(reports, &judged), reasons)
+    PageVerdict::new(status, headline(reports, &judged), reasons)
 }
 
 /// Refused and flagged points.

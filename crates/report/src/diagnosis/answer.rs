@@ -1,7 +1,7 @@
 //! The answer of a diagnosis, on one screen: what was found, where, how sure that is, and what to do.
 
 use super::words::{AMBIGUOUS, confidence, family, located, member, not_certain};
-use crate::document::{Block, Verdict};
+use crate::document::{Block, PageVerdict};
 use crate::status::Status;
 use crate::table::{Column, Table};
 use truegrind_calibration::diagnosis::cause_kind::CauseKind;
@@ -11,7 +11,7 @@ use truegrind_calibration::measurement::dataset::Sensor;
 use truegrind_math::sentence::{capitalised, counted, listed};
 
 /// How many causes were found, and what they gain.
-pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
+pub(super) fn verdict(diagnosis: &Diagnosis) -> PageVerdict {
     let sure = diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count();
     let further = diagnosis.findings.iter().filter(|f| is_possible(f)).count();
     let causes = |n: usize| counted(n, "cause", "causes");
@@ -53,7 +53,7 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
     } else {
         format!("{:.3} mm with all of them, geometry alone ", fits.extended.cv_rmse_mm)
     };
-    Verdict::new(
+    PageVerdict::new(
         status,
         format!(
             "{headline}: held-out error {with_causes}{:.3} mm, data sheet {:.3} mm; {floor}",

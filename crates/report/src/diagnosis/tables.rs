@@ -161,7 +161,9 @@ pub(super) fn rivals(finding: &Finding) -> Table {
                 place_of(rival.effect, rival.joints.as_deref(), rival.rows).into()
             }),
             (Column::number("cv_rmse_mm", "held out", "mm", 4), |rival| rival.cv_rmse_mm.into()),
-            (Column::number("beaten_by", "worse by", "2 ln Bayes factor", 1), |rival| rival.beaten_by.into()),
+            (Column::number("beaten_by", "worse by", "2 ln Bayes factor", 1), |rival| {
+                rival.twice_log_bayes_factor.into()
+            }),
         ],
     )
 }

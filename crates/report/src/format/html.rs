@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::{visible, words};
-use crate::document::{Block, Document, Figure, KeyFigure, Verdict};
+use crate::document::{Block, Document, Figure, KeyFigure, PageVerdict};
 use crate::status::Status;
 use crate::table::{Alignment, Cell, Table};
 
@@ -328,7 +328,7 @@ impl Page {
         ));
     }
 
-    fn verdict(&mut self, verdict: &Verdict) {
+    fn verdict(&mut self, verdict: &PageVerdict) {
         let status = verdict.status;
         self.push(&format!(
             "<section class=\"verdict {}\">\n<p><b>{}</b> {}</p>\n",

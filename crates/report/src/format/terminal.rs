@@ -9,12 +9,12 @@ use crate::status::Status;
 use crate::table::{Alignment, ColumnKind, Table};
 
 /// Text columns are narrowed to this width before a table is split into blocks.
-const NARROWEST_TEXT: usize = 12;
+const MIN_TEXT_WIDTH: usize = 12;
 /// Longer cells count as sentences, which need a wider column.
 const SENTENCE: usize = 40;
-const NARROWEST_SENTENCE: usize = 24;
+const MIN_SENTENCE_WIDTH: usize = 24;
 /// Longer names may be broken.
-const LONGEST_NAME: usize = 28;
+const MAX_UNBROKEN_NAME: usize = 28;
 const GAP: usize = 2;
 /// Stands for a space at which no line is broken.
 const GLUE: char = '\u{a0}';
@@ -158,7 +158,7 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
 fn shrink(table: &Table, lines: &[Vec<String>], widths: &mut [usize], width: usize) {
     let whole = widths.to_vec();
     let words = |c: usize| table.columns[c].alignment() == Alignment::Left;
-    let name = LONGEST_NAME.min(width / 3);
+    let name = MAX_UNBROKEN_NAME.min(width / 3);
     let least: Vec<usize> =
         (0..widths.len()).map(|c| narrowest(lines, c, whole[c], words(c).then_some(name))).collect();
     for text in [false, true] {
@@ -172,7 +172,7 @@ fn shrink(table: &Table, lines: &[Vec<String>], widths: &mut [usize], width: usi
     }
     if total(widths.iter().copied()) > width {
         // The table is split anyway, so only the widest columns are narrowed.
-        let most = (width.saturating_sub(GAP) / 2).max(NARROWEST_TEXT);
+        let most = (width.saturating_sub(GAP) / 2).max(MIN_TEXT_WIDTH);
         (0..widths.len()).filter(|&c| words(c)).for_each(|c| widths[c] = whole[c].min(most.max(widths[c])));
     }
 }
@@ -187,9 +187,9 @@ fn narrowest(lines: &[Vec<String>], column: usize, whole: usize, name: Option<us
         return heading.split(' ').map(length).fold(longest, usize::max);
     };
     match whole > SENTENCE {
-        true => NARROWEST_SENTENCE,
-        false if cells().any(|cell| cell.contains(' ')) => NARROWEST_TEXT,
-        false => longest.min(name).max(NARROWEST_TEXT),
+        true => MIN_SENTENCE_WIDTH,
+        false if cells().any(|cell| cell.contains(' ')) => MIN_TEXT_WIDTH,
+        false => longest.min(name).max(MIN_TEXT_WIDTH),
     }
 }
 
@@ -312,7 +312,7 @@ fn fit(cell: &str, width: usize, alignment: Alignment) -> String {
 /// A line with a note beside it, wrapped in its own column.
 fn beside(text: &mut String, line: &str, note: &str, width: usize) {
     let indent = length(line) + GAP;
-    let room = width.saturating_sub(indent).max(NARROWEST_SENTENCE);
+    let room = width.saturating_sub(indent).max(MIN_SENTENCE_WIDTH);
     let mut notes = wrapped(note, room, "");
     notes.truncate(notes.trim_end().len());
     for (index, note) in notes.split('\n').enumerate() {

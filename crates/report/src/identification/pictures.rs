@@ -10,7 +10,7 @@ const BEFORE: &str = "frames registered";
 const AFTER: &str = "geometry";
 
 /// Smaller singular values, relative to the largest, are rounding errors and would stretch the axis.
-const SMALLEST_SHARE: f64 = 1e-12;
+const MIN_SHARE: f64 = 1e-12;
 
 fn error(found: &Identification) -> Axis {
     Axis::new(if signed(found) { "held-out error, measured minus predicted" } else { "held-out error" }, "mm")
@@ -69,7 +69,7 @@ pub(super) fn parameters(found: &Identification) -> String {
 
 /// Singular values in decreasing order.
 pub(super) fn singular_values(report: &Identifiability) -> String {
-    let least = report.singular_values.first().copied().unwrap_or(0.0) * SMALLEST_SHARE;
+    let least = report.singular_values.first().copied().unwrap_or(0.0) * MIN_SHARE;
     let points: Vec<[f64; 2]> = report
         .singular_values
         .iter()

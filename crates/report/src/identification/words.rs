@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::document::{Block, Verdict};
+use crate::document::{Block, PageVerdict};
 use crate::number::Precision;
 use crate::status::Status;
 use truegrind_arm::parameter::Parameter;
@@ -57,7 +57,7 @@ pub(super) fn identifiability(found: &Identification, report: &Identifiability) 
     let missing = report.parameters.saturating_sub(report.rank);
     let rank = format!("Rank {} of {}", report.rank, report.parameters);
     if missing == 0 {
-        return Verdict::new(
+        return PageVerdict::new(
             Status::Good,
             format!("{rank}: the data determine all combinations of parameters"),
             [format!(
@@ -73,7 +73,7 @@ pub(super) fn identifiability(found: &Identification, report: &Identifiability) 
     } else {
         format!("{missing} combinations of parameters change no reading and are fixed by the priors")
     };
-    Verdict::new(Status::Warning, format!("{rank}: {what}"), combinations(found, report)).into()
+    PageVerdict::new(Status::Warning, format!("{rank}: {what}"), combinations(found, report)).into()
 }
 
 /// One sentence per combination of parameters that changes no reading, in mm and degrees.
@@ -112,7 +112,7 @@ pub(super) fn readout_fusion(found: &Identification) -> Block {
     match &found.readout_fusion {
         Ok(report) => {
             let point = report.readout_point_mm;
-            Verdict::new(
+            PageVerdict::new(
                 Status::Good,
                 format!(
                     "The Cartesian read-out of the controller refined the rounded angles: their σ is {:.0} % of the rounding error",
@@ -136,7 +136,7 @@ pub(super) fn readout_fusion(found: &Identification) -> Block {
             "Angles are used as logged: they are not rounded, some rows have no Cartesian read-out, or its use was switched off."
                 .to_owned(),
         ),
-        Err(NotFused::Mismatch { found_mm, expected_mm }) => Verdict::new(
+        Err(NotFused::Mismatch { found_mm, expected_mm }) => PageVerdict::new(
             Status::Warning,
             format!(
                 "The Cartesian read-out was not used: it differs by {found_mm:.3} mm RMS from the nominal arm at the logged angles, while rounding \
@@ -187,7 +187,7 @@ pub(super) fn outliers(found: &Identification) -> Block {
     let outliers = &found.outliers;
     match (outliers.rows.len(), outliers.too_many) {
         (0, 0) => Block::Paragraph("No row was set aside as an outlier.".to_owned()),
-        (0, many) => Verdict::new(
+        (0, many) => PageVerdict::new(
             Status::Warning,
             format!("{many} rows lie beyond {OUTLIER_CUT} robust standard deviations; these are too many for isolated outliers, so all rows are used"),
             ["look for what they have in common: a range of rows, a pose of the arm, a payload"],

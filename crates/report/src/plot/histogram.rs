@@ -7,7 +7,7 @@ use super::pen::{BOLD, Paint, Pen, dash};
 use super::scale::{Ends, Scale, linear_ticks};
 
 /// More bins would show noise.
-const MOST_BINS: usize = 60;
+const MAX_BINS: usize = 60;
 
 /// A histogram.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -67,7 +67,7 @@ impl Histogram {
         let span = high - low;
         let wanted = self.bins.unwrap_or_else(|| {
             let width = samples.iter().filter_map(|sample| freedman_diaconis(sample)).fold(span, f64::min);
-            ((span / width).ceil() as usize).clamp(5, MOST_BINS)
+            ((span / width).ceil() as usize).clamp(5, MAX_BINS)
         });
         let edges = edges(low, high, wanted.max(1));
         let counts = samples.iter().map(|sample| count(sample, &edges)).collect();

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 
 /// Smaller numbers are drawn as zero, since the powers of ten to scale them do not exist.
-const SMALLEST: f64 = 1e-290;
+const MIN_DRAWN: f64 = 1e-290;
 
 /// One axis of a frame.
 #[derive(Debug, Clone)]
@@ -51,9 +51,9 @@ impl Scale {
             // Halved to avoid overflow.
             let span = 2.0 * (high / 2.0 - low / 2.0);
             let size = low.abs().max(high.abs());
-            if span <= size * 1e-12 || size < SMALLEST {
+            if span <= size * 1e-12 || size < MIN_DRAWN {
                 // A constant: margins on both sides, so that its line is in the middle.
-                let room = if size < SMALLEST { 1.0 } else { size * 0.1 };
+                let room = if size < MIN_DRAWN { 1.0 } else { size * 0.1 };
                 [low, high] = [low - room, high + room];
             } else {
                 let margin = if matches!(ends, Ends::Tight | Ends::Nought) { 0.0 } else { 0.05 * span };
@@ -69,7 +69,7 @@ impl Scale {
         if let Some([first, last]) = axis.range
             && first.is_finite()
             && last > first
-            && last.abs().max(first.abs()) > SMALLEST
+            && last.abs().max(first.abs()) > MIN_DRAWN
             && last.is_finite()
             && (!axis.log || first > 0.0)
         {

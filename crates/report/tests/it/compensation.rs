@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 use truegrind_arm::inverse::InverseError;
 use truegrind_arm::model::Limited;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::cut_risk::CutRisk;
@@ -41,13 +41,13 @@ const SECOND: &[u8] = b"MODULE Other
 ENDMODULE
 ";
 
-fn outcome(motion: u32, status: Status, reason: Option<OutcomeReason>) -> MotionOutcome {
+fn outcome(motion: u32, status: MotionStatus, reason: Option<OutcomeReason>) -> MotionOutcome {
     MotionOutcome {
         motion,
         status,
         reason: reason.map(Box::new),
         before_mm: 1.5.into(),
-        after_mm: if status == Status::Changed { 0.0004 } else { 1.5 }.into(),
+        after_mm: if status == MotionStatus::Changed { 0.0004 } else { 1.5 }.into(),
         sigma_mm: 0.12.into(),
         shape_sigma_mm: OptionF64::NONE,
         path_deviation_mm: OptionF64::NONE,
@@ -59,17 +59,17 @@ fn outcome(motion: u32, status: Status, reason: Option<OutcomeReason>) -> Motion
 fn example() -> (Plan, Listing, Vec<ProgramFile>) {
     let task = Task::read(&[("grind.mod", PROGRAM), ("other.mod", SECOND)]);
     let mut outcomes = vec![
-        outcome(0, Status::Left, Some(OutcomeReason::JointTarget)),
-        outcome(1, Status::Changed, None),
-        outcome(2, Status::Flagged, Some(OutcomeReason::JointNotMeasured { joint: 4, by_deg: 5.0 })),
-        outcome(3, Status::Flagged, Some(OutcomeReason::JointNotMeasured { joint: 4, by_deg: 7.25 })),
-        outcome(4, Status::Refused, Some(OutcomeReason::CorrectionTooLarge { mm: 12.345 })),
+        outcome(0, MotionStatus::Left, Some(OutcomeReason::JointTarget)),
+        outcome(1, MotionStatus::Changed, None),
+        outcome(2, MotionStatus::Flagged, Some(OutcomeReason::JointNotMeasured { joint: 4, by_deg: 5.0 })),
+        outcome(3, MotionStatus::Flagged, Some(OutcomeReason::JointNotMeasured { joint: 4, by_deg: 7.25 })),
+        outcome(4, MotionStatus::Refused, Some(OutcomeReason::CorrectionTooLarge { mm: 12.345 })),
         outcome(
             5,
-            Status::Refused,
+            MotionStatus::Refused,
             Some(OutcomeReason::Inverse(InverseError::Unreachable { beyond_mm: f64::NAN })),
         ),
-        outcome(6, Status::Left, Some(OutcomeReason::Program(Reason::Displacement))),
+        outcome(6, MotionStatus::Left, Some(OutcomeReason::Program(Reason::Displacement))),
     ];
     outcomes[0].before_mm = OptionF64::NONE;
     outcomes[0].after_mm = OptionF64::NONE;
@@ -165,8 +165,9 @@ left,1,a program displacement or external axis offset is or may be active,,other
 fn lines_of_successive_motions_are_a_range_and_many_ranges_are_cut_short() {
     let (mut plan, listing, files) = example();
     let mut lines = |motions: &[u32]| {
-        let left =
-            |motion: &u32| outcome(*motion, Status::Left, Some(OutcomeReason::Risk { chance: 0.64404 }));
+        let left = |motion: &u32| {
+            outcome(*motion, MotionStatus::Left, Some(OutcomeReason::Risk { chance: 0.64404 }))
+        };
         plan.outcomes = motions.iter().map(left).collect();
         csv::table(&view::reason_table(&plan, &listing, &files))
     };
@@ -181,9 +182,9 @@ fn a_cut_that_stays_names_the_line_that_caused_it() {
     let (mut plan, listing, files) = example();
     let part = |line| Some(OutcomeReason::PartOfCut { line, because: "target is out of reach" });
     plan.outcomes = vec![
-        outcome(2, Status::Refused, part(9)),
-        outcome(3, Status::Refused, part(9)),
-        outcome(5, Status::Refused, Some(OutcomeReason::Step { line: 9, mm: 0.5 })),
+        outcome(2, MotionStatus::Refused, part(9)),
+        outcome(3, MotionStatus::Refused, part(9)),
+        outcome(5, MotionStatus::Refused, Some(OutcomeReason::Step { line: 9, mm: 0.5 })),
     ];
     let text = csv::table(&view::reason_table(&plan, &listing, &files[..1]));
     assert!(text.contains("of this cut is not corrected: target is out of reach (line 9)"), "{text}");
@@ -204,7 +205,7 @@ fn motions_that_are_kept_for_the_sake_of_others_share_a_group_whatever_the_line(
     ];
     for (index, reason) in for_other.iter().enumerate() {
         plan.outcomes =
-            (0..7).map(|motion| outcome(motion, Status::Refused, Some(reason(20 + motion)))).collect();
+            (0..7).map(|motion| outcome(motion, MotionStatus::Refused, Some(reason(20 + motion)))).collect();
         let table = view::reason_table(&plan, &listing, &files[..1]);
         assert_eq!(table.rows.len(), 1, "{index}");
         let text = csv::table(&table);
@@ -216,7 +217,7 @@ fn motions_that_are_kept_for_the_sake_of_others_share_a_group_whatever_the_line(
 #[test]
 fn a_reason_that_rows_share_is_printed_once() {
     let (mut plan, listing, files) = example();
-    let left = |motion| outcome(motion, Status::Left, Some(OutcomeReason::Risk { chance: 0.5 }));
+    let left = |motion| outcome(motion, MotionStatus::Left, Some(OutcomeReason::Risk { chance: 0.5 }));
     plan.outcomes = (0..4).map(left).collect();
     let page = view::document(&plan, &listing, &files[..1], &[]);
     let text = markdown::document(&page);
@@ -253,7 +254,7 @@ fn coverage_counts_and_never_rounds_to_all_or_nothing() {
         "7 motions: 3 corrected (42.9 %), of which 2 are flagged; 2 refused (28.6 %); 2 left (28.6 %)"
     );
     plan.outcomes = (0..100_000)
-        .map(|i| outcome(i, if i == 0 { Status::Refused } else { Status::Changed }, None))
+        .map(|i| outcome(i, if i == 0 { MotionStatus::Refused } else { MotionStatus::Changed }, None))
         .collect();
     assert_eq!(
         view::coverage(&plan),
@@ -274,7 +275,7 @@ fn verdict_and_page_tell_what_to_look_at() {
     assert!(text.contains("written to out/grind.mod"), "{text}");
     let page = leave("compensation.html", &view::document(&plan, &listing, &files, &[]));
     assert!(page.contains(">Motions</h2>") && page.contains(">Regions that could not be read</h2>"));
-    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = Status::Changed);
+    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = MotionStatus::Changed);
     let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
     assert!(text.contains("[warning] Corrected, but parts of the program could not be read"), "{text}");
     listing.opaque.clear();
@@ -305,9 +306,9 @@ fn verdict_and_page_tell_what_to_look_at() {
         );
     }
     for (status, sentence) in [
-        (Status::Changed, "[ok] All correctable motions are corrected"),
-        (Status::Left, "[not evaluated] Nothing was corrected"),
-        (Status::Refused, "[failed] Nothing could be corrected"),
+        (MotionStatus::Changed, "[ok] All correctable motions are corrected"),
+        (MotionStatus::Left, "[not evaluated] Nothing was corrected"),
+        (MotionStatus::Refused, "[failed] Nothing could be corrected"),
     ] {
         plan.outcomes.iter_mut().for_each(|outcome| outcome.status = status);
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
@@ -357,7 +358,7 @@ fn a_work_object_without_a_corrected_motion_is_not_called_corrected() {
     }];
     let said = |plan: &Plan| sentences(plan, &listing).join("\n");
     assert!(said(&plan).contains("wobj0: shape and placement are corrected; the path as a whole"));
-    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = Status::Left);
+    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = MotionStatus::Left);
     let text = said(&plan);
     assert!(
         text.contains("wobj0: no motion with it is corrected; the path as a whole is displaced by 2.131 mm"),
@@ -457,9 +458,9 @@ fn before_and_after_are_stated_of_the_same_motions() {
     );
     let listing = Task::read(&[("m.mod", source.as_bytes())]).listing;
     let mut outcomes = vec![
-        outcome(0, Status::Changed, None),
-        outcome(1, Status::Changed, None),
-        outcome(2, Status::Changed, None),
+        outcome(0, MotionStatus::Changed, None),
+        outcome(1, MotionStatus::Changed, None),
+        outcome(2, MotionStatus::Changed, None),
     ];
     // Over wobj0 all is corrected; over wS the shape alone, of which a joint motion has none.
     (outcomes[0].before_mm, outcomes[0].sigma_mm) = (1.2.into(), 0.558.into());
@@ -529,7 +530,7 @@ fn a_program_that_is_corrected_again_states_no_before_and_after() {
 #[test]
 fn an_uncorrected_program_says_where_its_deviation_is_unknown() {
     let (mut plan, listing, files) = example();
-    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = Status::Left);
+    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = MotionStatus::Left);
     let text = terminal::document(&view::summary(&plan, &listing, &files), 400);
     let expected = "the uncorrected program deviates by up to 1.500 mm; unknown at 1 motion";
     assert!(text.contains(expected), "{text}");

@@ -3,7 +3,7 @@
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use truegrind_arm::region::Outside;
 use truegrind_compensation::deviation::{
-    After, BetweenTargets, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
+    After, BetweenTargets, Deviation, MissingMotion, MissingMotions, MotionStatus, PathPoint, PathReport,
 };
 use truegrind_compensation::plan::Plan;
 use truegrind_math::se3::Pose;
@@ -57,7 +57,7 @@ fn point(
         sigma_mm: Some(0.12),
         shape_sigma_mm: None,
         outside: None,
-        status: Status::Changed,
+        status: MotionStatus::Changed,
         reason: None,
     }
 }
@@ -83,10 +83,10 @@ fn three(surface: bool) -> PathReport {
         point(1, [2.0, 2.0, 3.0], Some([0.0, 0.0, -1.0]), Some([0.003, 0.004, 0.0]), surface),
         point(2, [3.0, 2.0, 3.0], None, None, false),
     ];
-    points[1].status = Status::Flagged;
+    points[1].status = MotionStatus::Flagged;
     points[1].reason = Some("joint 5 is 5.0° outside the range in which the arm was measured".to_owned());
     points[1].outside = Some(Outside::Joint { joint: 4, by_deg: 5.0 });
-    points[2].status = Status::Refused;
+    points[2].status = MotionStatus::Refused;
     points[2].reason = Some("target is out of reach".to_owned());
     points[2].line = 0;
     points[2].sigma_mm = None;
@@ -108,7 +108,7 @@ fn raster(model: &str, after: After, remains: f64) -> PathReport {
             point.cutting = cutting;
             point.sigma_mm = Some(0.09 + 0.0006 * x);
             if pass == 13 && step > 25 {
-                point.status = Status::Flagged;
+                point.status = MotionStatus::Flagged;
                 point.reason =
                     Some("no measured pose is near: 1.4 times the distance of measured poses".to_owned());
             }
@@ -156,7 +156,7 @@ fn motions_without_a_point_stand_at_their_place_with_their_reason() {
         file,
         line,
         instruction: "MoveJ".to_owned(),
-        status: Status::Refused,
+        status: MotionStatus::Refused,
         reason: Some("target is out of reach".to_owned()),
     };
     let motions = vec![without(0, 1, 3), without(1, 0, 7), without(1, 0, 8), without(3, 0, 9)];
@@ -318,7 +318,7 @@ fn flags_are_listed_by_line_with_their_reasons() {
     // Neighbours of a kind share a row; another joint or another fate does not.
     let mut long = report("m", (0..6).map(|k| point(k, [k as f64, 0.0, 0.0], None, None, false)).collect());
     for (k, (joint, by)) in [(5, "5.0"), (5, "5.5"), (5, "6.0"), (6, "6.0"), (6, "6.0")].iter().enumerate() {
-        long.points[k].status = Status::Flagged;
+        long.points[k].status = MotionStatus::Flagged;
         long.points[k].reason = Some(format!("joint {joint} is {by}° outside"));
     }
     assert_eq!(
@@ -416,7 +416,7 @@ fn motions_without_a_deviation_are_counted_under_each_model() {
             file: 0,
             line: *line,
             instruction: "MoveJ".to_owned(),
-            status: Status::Left,
+            status: MotionStatus::Left,
             reason: None,
         };
         let listed: Vec<String> = lines.iter().map(u32::to_string).collect();
@@ -444,7 +444,7 @@ fn motions_without_a_deviation_are_counted_under_each_model() {
 #[test]
 fn a_correction_smaller_than_its_sigma_is_called_so() {
     let mut unsure = raster("m", After::PredictedRemainder, 1e-4);
-    unsure.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
+    unsure.points.iter_mut().for_each(|point| (point.status, point.reason) = (MotionStatus::Changed, None));
     let page = |report: &PathReport| terminal::document(&view::document(std::slice::from_ref(report)), 200);
     assert!(page(&unsure).contains("[ok] Largest deviation"));
     unsure.points.iter_mut().for_each(|point| point.sigma_mm = Some(4.0));
@@ -466,7 +466,7 @@ fn a_correction_smaller_than_its_sigma_is_called_so() {
 fn a_point_that_is_not_corrected_keeps_its_deviation() {
     let mut unsure = raster("m", After::PredictedRemainder, 1e-4);
     for point in &mut unsure.points {
-        (point.status, point.sigma_mm, point.after) = (Status::Left, Some(4.0), point.before);
+        (point.status, point.sigma_mm, point.after) = (MotionStatus::Left, Some(4.0), point.before);
     }
     let largest = unsure.cut().filter_map(|p| p.before.map(|d| d.norm_mm())).reduce(f64::max);
     assert_eq!(unsure.expected_mm(), largest);
@@ -519,7 +519,7 @@ fn a_path_that_is_corrected_in_part_is_judged_as_a_whole() {
             let after = if corrected(k) { [0.0; 3] } else { before(k) };
             let mut point =
                 point(k, [20.0 * k as f64, 100.0, 3.0 * (k % 3) as f64], Some(before(k)), Some(after), false);
-            point.status = if corrected(k) { Status::Changed } else { Status::Left };
+            point.status = if corrected(k) { MotionStatus::Changed } else { MotionStatus::Left };
             point
         });
         report("arm", points.collect())
@@ -545,7 +545,7 @@ fn a_path_that_is_corrected_in_part_is_judged_as_a_whole() {
         file: 0,
         line: 13,
         instruction: "MoveL".to_owned(),
-        status: Status::Left,
+        status: MotionStatus::Left,
         reason: None,
     };
     part.missing = Some(MissingMotions { motions: vec![motion], lines: "line 13".to_owned() });
@@ -562,7 +562,7 @@ fn a_path_that_is_corrected_in_part_is_judged_as_a_whole() {
 #[test]
 fn a_program_that_differs_by_more_than_a_correction_fails_with_its_lines() {
     let mut report = raster("arm", After::PredictedRemainder, 0.0);
-    report.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
+    report.points.iter_mut().for_each(|point| (point.status, point.reason) = (MotionStatus::Changed, None));
     let status = |report: &PathReport| view::status(std::slice::from_ref(report));
     assert_eq!(status(&report), ViewStatus::Good);
     report.differences = (0..14).map(|k| format!("line {k}: MoveJ here, MoveL in the original")).collect();
@@ -574,7 +574,7 @@ fn a_program_that_differs_by_more_than_a_correction_fails_with_its_lines() {
     assert_eq!(json["programs"][0]["models"][0]["differences"].as_array().unwrap().len(), 14);
     // Nothing was corrected: nothing is judged.
     let mut plain = raster("arm", After::PredictedRemainder, 0.0);
-    plain.points.iter_mut().for_each(|point| (point.after, point.status) = (None, Status::Left));
+    plain.points.iter_mut().for_each(|point| (point.after, point.status) = (None, MotionStatus::Left));
     assert_eq!(status(&plain), ViewStatus::Good);
 }
 
@@ -598,16 +598,19 @@ fn what_stays_is_not_called_a_standard_deviation() {
         page.lines().find(|line| line.starts_with('[')).unwrap().to_owned()
     };
     let mut report = raster("m", After::PredictedRemainder, 1e-4);
-    report.points.iter_mut().for_each(|point| (point.status, point.sigma_mm) = (Status::Changed, Some(0.05)));
+    report
+        .points
+        .iter_mut()
+        .for_each(|point| (point.status, point.sigma_mm) = (MotionStatus::Changed, Some(0.05)));
     assert!(headline(&report).contains("a standard deviation (1σ) of at most 0.050 mm is expected;"));
     let stays = report.points[20].before.unwrap().norm_mm();
-    (report.points[20].status, report.points[20].after) = (Status::Left, report.points[20].before);
+    (report.points[20].status, report.points[20].after) = (MotionStatus::Left, report.points[20].before);
     let words = format!(
         "of at most 0.050 mm is expected, and points that are not corrected deviate by up to {stays:.3} mm"
     );
     assert!(headline(&report).contains(&words), "{}", headline(&report));
     for point in &mut report.points {
-        (point.status, point.after) = (Status::Left, point.before);
+        (point.status, point.after) = (MotionStatus::Left, point.before);
     }
     assert!(headline(&report).contains("Nothing was corrected: both programs state the same targets"));
     assert!(!headline(&report).contains('σ'), "{}", headline(&report));
@@ -654,7 +657,7 @@ fn the_shape_is_that_of_each_part() {
 #[test]
 fn a_line_that_is_not_checked_is_a_warning() {
     let mut report = raster("m", After::PredictedRemainder, 1e-4);
-    report.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
+    report.points.iter_mut().for_each(|point| (point.status, point.reason) = (MotionStatus::Changed, None));
     let judged = |unchecked_lines: Option<&str>, first_lines: Option<&str>| {
         let between = BetweenTargets {
             tolerance_mm: 0.05,

@@ -1,5 +1,5 @@
 use proptest::prelude::*;
-use truegrind_report::document::{Block, Document, KeyFigure, Provenance, Verdict};
+use truegrind_report::document::{Block, Document, KeyFigure, PageVerdict, Provenance};
 use truegrind_report::format::{csv, html, json, markdown, terminal, visible};
 use truegrind_report::status::Status;
 use truegrind_report::table::{Alignment, Cell, Column, Table};
@@ -328,7 +328,7 @@ fn hostile() -> Document {
     page.paragraph(HOSTILE);
     page.push(Block::List(vec![HOSTILE.to_owned()]));
     page.push(Block::Code(HOSTILE.to_owned()));
-    page.push(Verdict::new(Status::Bad, HOSTILE, [HOSTILE]));
+    page.push(PageVerdict::new(Status::Bad, HOSTILE, [HOSTILE]));
     page.push(Block::Details { summary: HOSTILE.to_owned(), blocks: vec![table.into()] });
     page
 }
@@ -381,7 +381,7 @@ fn what_acts_without_showing_is_spelled_out_in_every_format() {
     page.push(Block::List(vec![words.clone()]));
     page.push(Block::Code(words.clone()));
     page.push(vec![KeyFigure::new(&words, 1.0, 1, &words).note(&words)]);
-    page.push(Verdict::new(Status::Bad, &words, [&words]));
+    page.push(PageVerdict::new(Status::Bad, &words, [&words]));
     page.push(Provenance { remarks: vec![(words.clone(), words.clone())], ..Provenance::here() });
     page.push(Block::Table(table.clone()));
     page.push(Block::Details { summary: words.clone(), blocks: vec![table.clone().into()] });

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use serde_json::json;
 use truegrind_arm::region::Outside;
 use truegrind_compensation::deviation::{
-    After, BetweenTargets, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
+    After, BetweenTargets, Deviation, MissingMotion, MissingMotions, MotionStatus, PathPoint, PathReport,
 };
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
@@ -53,7 +53,7 @@ prop_compose! {
         sigmas in prop::array::uniform2(prop::option::of(number())),
         (index, line, part, cutting, kind) in (any::<u32>(), any::<u32>(), any::<u32>(), any::<bool>(), 0..6_usize),
         (instruction, reason) in (".*", prop::option::of(".*")),
-        status in prop::sample::select(vec![Status::Changed, Status::Left, Status::Refused, Status::Flagged]),
+        status in prop::sample::select(vec![MotionStatus::Changed, MotionStatus::Left, MotionStatus::Refused, MotionStatus::Flagged]),
     ) -> PathPoint {
         let kinds = [
             MotionKind::Linear, MotionKind::Joint, MotionKind::Circular, MotionKind::AbsoluteJoint, MotionKind::External,
@@ -123,7 +123,7 @@ proptest! {
             file: 1,
             line: 3,
             instruction: "MoveL".into(),
-            status: Status::Left,
+            status: MotionStatus::Left,
             reason: Some("out of reach".into()),
         };
         let missing = Some(MissingMotions { motions: vec![left], lines: "line 3".into() });

@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use truegrind_report::document::{Block, Document, Figure, KeyFigure, Provenance, Source, Verdict};
+use truegrind_report::document::{Block, Document, Figure, KeyFigure, PageVerdict, Provenance, Source};
 use truegrind_report::format::{html, markdown, terminal};
 use truegrind_report::number::Precision;
 use truegrind_report::plot::{
@@ -40,7 +40,7 @@ pub(super) fn everything() -> Document {
     let [before, after] = deviations(400);
     let mut page = Document::new("Report with everything on it <truegrind>");
     page.subtitle = "abb-irb-120, 400 path points; an example with invented numbers".to_owned();
-    page.push(Verdict::new(
+    page.push(PageVerdict::new(
         Status::Warning,
         "The model may be used inside its region",
         ["converged after 9 iterations", "rank 27 of 28", "12 targets lie outside the measured region"],
@@ -53,8 +53,8 @@ pub(super) fn everything() -> Document {
             .note("no pose was repeated")
             .status(Status::NotEvaluated),
     ]);
-    page.push(Verdict::new(Status::Good, "Everything that was asked is done", Vec::<String>::new()));
-    page.push(Verdict::new(
+    page.push(PageVerdict::new(Status::Good, "Everything that was asked is done", Vec::<String>::new()));
+    page.push(PageVerdict::new(
         Status::Bad,
         "The fit did not converge; no model was written",
         ["cost still falling after 200 iterations"],

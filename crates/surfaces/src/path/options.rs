@@ -118,7 +118,7 @@ impl Default for PathOptions {
 
 impl PathOptions {
     /// Largest number of points of a path.
-    pub const LARGEST: usize = 200_000;
+    pub const MAX_POINTS: usize = 200_000;
 
     /// Refuses options for which no path can be made.
     ///

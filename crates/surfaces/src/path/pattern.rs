@@ -105,7 +105,7 @@ impl Curve {
 /// The curves of a pattern over a surface, in the order of cutting.
 ///
 /// # Errors
-/// A hollow into which the tool does not fit, more than [`PathOptions::LARGEST`] passes, an exhausted budget, or a pattern
+/// A hollow into which the tool does not fit, more than [`PathOptions::MAX_POINTS`] passes, an exhausted budget, or a pattern
 /// that nowhere meets the surface.
 pub(crate) fn curves(
     surface: &Surface,
@@ -123,8 +123,8 @@ pub(crate) fn curves(
     if total.is_nan() || total <= 0.0 {
         return Err(SurfaceError::NoPass);
     }
-    if total >= PathOptions::LARGEST as f64 {
-        return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
+    if total >= PathOptions::MAX_POINTS as f64 {
+        return Err(SurfaceError::TooLong { limit: PathOptions::MAX_POINTS });
     }
     let places: Vec<f64> = (0..=ACROSS).map(|k| k as f64 / ACROSS as f64).collect();
     let across = |sum: f64| interpolated(&sums, &places, sum);

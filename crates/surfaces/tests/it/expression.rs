@@ -1,5 +1,5 @@
 use truegrind_math::difference;
-use truegrind_surfaces::expression::{DEEPEST, Expression, FUNCTIONS, LONGEST};
+use truegrind_surfaces::expression::{Expression, FUNCTIONS, MAX_CHARACTERS, MAX_DEPTH};
 
 fn value(text: &str, at: [f64; 3]) -> f64 {
     Expression::parse(text, &["x", "y", "z"]).unwrap().value(&at)
@@ -185,10 +185,10 @@ fn the_work_of_derivatives_grows_with_the_length_alone() {
 fn long_and_deep_texts_are_refused_not_overflown() {
     for text in ["(".repeat(1500), "-".repeat(1500), "sin(".repeat(400), "2^".repeat(900)] {
         let error = Expression::parse(&text, &["x"]).unwrap_err();
-        assert!(error.expected.contains(&DEEPEST.to_string()), "{}", error.expected);
+        assert!(error.expected.contains(&MAX_DEPTH.to_string()), "{}", error.expected);
     }
-    let error = Expression::parse(&"x+".repeat(LONGEST), &["x"]).unwrap_err();
-    assert!(error.expected.contains(&LONGEST.to_string()), "{error}");
-    let deep = format!("{}x{}", "(".repeat(DEEPEST / 2 - 1), ")".repeat(DEEPEST / 2 - 1));
+    let error = Expression::parse(&"x+".repeat(MAX_CHARACTERS), &["x"]).unwrap_err();
+    assert!(error.expected.contains(&MAX_CHARACTERS.to_string()), "{error}");
+    let deep = format!("{}x{}", "(".repeat(MAX_DEPTH / 2 - 1), ")".repeat(MAX_DEPTH / 2 - 1));
     assert_eq!(Expression::parse(&deep, &["x"]).unwrap().value(&[4.0]), 4.0);
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::identification::fit::Fitted;
 use crate::identification::linearised_readings::{LinearisedReadings, fits_scale};
-use crate::identification::scaled_cholesky::{MANY, ScaledCholesky, factorise};
+use crate::identification::scaled_cholesky::{MANY_COLUMNS, ScaledCholesky, factorise};
 use crate::identification::sensor_laws::SensorLaw;
 use crate::identification::tolerance::Tolerance;
 use truegrind_arm::parameter::Parameter;
@@ -114,7 +114,7 @@ pub(super) fn hypotheses(
     tolerance: &Tolerance,
     alternatives: &[Alternative],
 ) -> Vec<Hypothesis> {
-    let step = if fitted.parameters.len() > MANY { 2 } else { 1 };
+    let step = if fitted.parameters.len() > MANY_COLUMNS { 2 } else { 1 };
     let mut out = Vec::new();
     for (k, alternative) in alternatives.iter().enumerate() {
         let of_law = alternative.columns.len() - usize::from(alternative.scale.is_some());

@@ -22,7 +22,7 @@ const BLOCK_LANES: usize = 64;
 const COST_LANES: usize = 16;
 
 /// Up to this number of parameters a block of [`BLOCK_LANES`] stays in the cache.
-const FEW: usize = 64;
+const FEW_PARAMETERS: usize = 64;
 
 /// Bytes of a buffer for more parameters.
 const BUFFER_BYTES: usize = 1 << 20;
@@ -35,7 +35,11 @@ thread_local! {
 /// Groups of eight rows in a block, for p parameters and c components: a function of the problem alone, so that sums are the
 /// same for any number of threads.
 fn block_lanes(p: usize, c: usize) -> usize {
-    if p <= FEW { BLOCK_LANES } else { (BUFFER_BYTES / ((p + 1) * c * WIDTH * 8)).clamp(4, BLOCK_LANES) }
+    if p <= FEW_PARAMETERS {
+        BLOCK_LANES
+    } else {
+        (BUFFER_BYTES / ((p + 1) * c * WIDTH * 8)).clamp(4, BLOCK_LANES)
+    }
 }
 
 impl CalibrationProblem {
@@ -149,7 +153,7 @@ impl Problem for CalibrationProblem {
         let state = State::of(self, x);
         let c = self.sensor.scalars();
         let parts: Vec<f64> = self
-            .blocks_of(if self.parameters.len() > FEW { COST_LANES } else { BLOCK_LANES })
+            .blocks_of(if self.parameters.len() > FEW_PARAMETERS { COST_LANES } else { BLOCK_LANES })
             .into_par_iter()
             .map(|(from, lanes)| {
                 checkpoint();
@@ -195,7 +199,7 @@ impl CalibrationProblem {
         let most = block_lanes(p, c);
         let blocks = self.blocks_of(most);
         // With many parameters a square matrix per block would cost more than its products, so several blocks share one.
-        let together = if p > FEW { (2 * p).div_ceil(most * WIDTH * c) } else { 1 };
+        let together = if p > FEW_PARAMETERS { (2 * p).div_ceil(most * WIDTH * c) } else { 1 };
         let part = |blocks: &[(usize, usize)]| {
             checkpoint();
             let mut sums = DMatrix::zeros(shape.0, shape.1);

@@ -238,18 +238,18 @@ fn list(names: &[String]) -> String {
     if names.is_empty() {
         return "none".into();
     }
-    let shown = |name: &String| match name.char_indices().nth(LONGEST_NAME) {
+    let shown = |name: &String| match name.char_indices().nth(MAX_UNBROKEN_NAME) {
         Some((end, _)) => format!("`{}…`", &name[..end]),
         None => format!("`{name}`"),
     };
-    let more = names.len().saturating_sub(MOST_NAMES);
-    let shown = names.iter().take(MOST_NAMES).map(shown).collect::<Vec<_>>().join(", ");
+    let more = names.len().saturating_sub(MAX_NAMES);
+    let shown = names.iter().take(MAX_NAMES).map(shown).collect::<Vec<_>>().join(", ");
     if more > 0 { format!("{shown} and {more} more") } else { shown }
 }
 
 /// Limits for column names in messages: characters of a name, and number of names.
-const LONGEST_NAME: usize = 32;
-const MOST_NAMES: usize = 40;
+const MAX_UNBROKEN_NAME: usize = 32;
+const MAX_NAMES: usize = 40;
 
 /// A hint where the first line has only numbers and thus is not a header.
 fn headless(found: &[String]) -> &'static str {

@@ -27,7 +27,7 @@ const SAME_TCP: f64 = 1e-3;
 const ROBODK: [usize; 2] = [12, 18];
 
 /// Largest angle of a pose of RoboDK: half a turn, and what rounding adds (rad).
-const LARGEST_RAD: f64 = std::f64::consts::PI + 1e-3;
+const MAX_ANGLE_RAD: f64 = std::f64::consts::PI + 1e-3;
 
 /// Cells of a row of DELMIA for an arm of six joints.
 const DELMIA: usize = 13;
@@ -36,7 +36,7 @@ const DELMIA: usize = 13;
 const DELMIA_JOINT: usize = 7;
 
 /// Fewest rows by which such a table can be recognised.
-const LEAST: usize = 4;
+const MIN_ROWS: usize = 4;
 
 /// The table under truegrind's header, and notes; `None` for an unknown format.
 ///
@@ -48,7 +48,7 @@ pub(super) fn convert(file: &str, table: &Table) -> Option<Result<(Table, Vec<St
     // In a header, only the first cell can be a number.
     let headed = first.cells.iter().skip(1).all(|cell| cell.number().is_none());
     let rows = if headed { rest } else { &used[..] };
-    if rows.len() < LEAST {
+    if rows.len() < MIN_ROWS {
         return None;
     }
     let foreign = |first_joint: usize| !headed || !is_ours(first, first_joint);
@@ -148,7 +148,7 @@ fn robodk(rows: &[&Line], width: usize, location: &Location) -> Option<Result<Ro
                        arm, and give the others with --also";
         return refuse(None, message.to_owned());
     }
-    let wide = |row: &&Measured<'_>| row.target[3..].iter().any(|angle| angle.abs() > LARGEST_RAD);
+    let wide = |row: &&Measured<'_>| row.target[3..].iter().any(|angle| angle.abs() > MAX_ANGLE_RAD);
     if let Some(row) = measured.iter().copied().find(|row| wide(row)) {
         let found = row.target[3..].iter().fold(0.0_f64, |largest, angle| largest.max(angle.abs()));
         let message = format!(

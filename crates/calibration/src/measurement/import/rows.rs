@@ -139,7 +139,7 @@ impl Stations {
 /// Refuses more outlets or stations than can be identified.
 fn check_outlets(reader: &Reader<'_>, columns: &HeaderColumns, rows: &[Row]) -> Result<(), ImportError> {
     let places = rows.iter().map(|row| row.anchor + 1).max().unwrap_or(1);
-    if places <= MOST_OUTLETS {
+    if places <= MAX_OUTLETS {
         return Ok(());
     }
     let (column, what, remedy) = if columns.station.is_some() {
@@ -170,14 +170,14 @@ fn reading_step(rows: &[Row], sensor: Sensor) -> Option<f64> {
 }
 
 /// Largest joint angle: ten turns.
-const LARGEST_DEG: f64 = 3600.0;
+const MAX_ANGLE_DEG: f64 = 3600.0;
 /// Largest reading: a kilometre.
-const LARGEST_MM: f64 = 1e6;
+const MAX_LENGTH_MM: f64 = 1e6;
 const LENGTH: &str = "a length in mm, below a kilometre";
 /// Most cable outlets; the cost of identification grows with the cube of their number.
-const MOST_OUTLETS: usize = 64;
+const MAX_OUTLETS: usize = 64;
 /// Largest payload.
-const LARGEST_KG: f64 = 1e4;
+const MAX_PAYLOAD_KG: f64 = 1e4;
 
 /// Interned conditions: many rows share few of them.
 #[derive(Default)]
@@ -189,7 +189,7 @@ struct Conditions {
 type Bits = ([Option<u64>; 3], [i8; 6]);
 
 /// Most interned conditions; in a log with times every row has its own.
-const MOST_SHARED: usize = 4096;
+const MAX_SHARED: usize = 4096;
 
 impl Conditions {
     fn share(&mut self, condition: Condition) -> Arc<Condition> {
@@ -199,7 +199,7 @@ impl Conditions {
             return shared.clone();
         }
         let new = Arc::new(condition);
-        if self.seen.len() < MOST_SHARED {
+        if self.seen.len() < MAX_SHARED {
             self.seen.insert(key, new.clone());
         }
         new
@@ -283,7 +283,7 @@ impl Reader<'_> {
     ) -> Result<Row, ImportError> {
         let mut joints = Joints::zeros();
         for (joint, &column) in columns.joints.iter().enumerate() {
-            let angle_deg = self.bounded(line, column, LARGEST_DEG, "an angle in degrees, within ±3600")?;
+            let angle_deg = self.bounded(line, column, MAX_ANGLE_DEG, "an angle in degrees, within ±3600")?;
             angles.add(joint, angle_deg);
             joints[joint] = angle_deg.to_radians();
         }
@@ -291,16 +291,16 @@ impl Reader<'_> {
         let readout_mm = match columns.readout {
             Some(c) if c.iter().any(|&i| !line.cells.get(i).is_none_or(Cell::is_empty)) => {
                 Some(Vector3::new(
-                    self.bounded(line, c[0], LARGEST_MM, LENGTH)?,
-                    self.bounded(line, c[1], LARGEST_MM, LENGTH)?,
-                    self.bounded(line, c[2], LARGEST_MM, LENGTH)?,
+                    self.bounded(line, c[0], MAX_LENGTH_MM, LENGTH)?,
+                    self.bounded(line, c[1], MAX_LENGTH_MM, LENGTH)?,
+                    self.bounded(line, c[2], MAX_LENGTH_MM, LENGTH)?,
                 ))
             }
             _ => None,
         };
         let approach = self.approach(line, columns)?;
         let payload_kg = self.optional(line, columns.payload)?;
-        if payload_kg.is_some_and(|kg| !(0.0..=LARGEST_KG).contains(&kg)) {
+        if payload_kg.is_some_and(|kg| !(0.0..=MAX_PAYLOAD_KG).contains(&kg)) {
             let remedy = "enter the mass at the flange, or leave the cell empty";
             return Err(self.wrong(
                 line,
@@ -348,7 +348,7 @@ impl Reader<'_> {
         let values: Vec<f64> = columns
             .reading
             .iter()
-            .map(|&c| self.bounded(line, c, LARGEST_MM, LENGTH))
+            .map(|&c| self.bounded(line, c, MAX_LENGTH_MM, LENGTH))
             .collect::<Result<_, _>>()?;
         Ok(match (columns.sensor, values.as_slice()) {
             (Sensor::Cable, [length]) => Reading::Cable(*length),

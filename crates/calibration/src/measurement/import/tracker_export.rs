@@ -15,7 +15,7 @@ use super::error::{ImportError, Location};
 const NAMES: [&str; 4] = ["name", "point", "target", "tag"];
 
 /// Most names before x: collection, group, target.
-const MOST_NAMES: usize = 3;
+const MAX_NAMES: usize = 3;
 
 /// A measured point.
 #[derive(Debug)]
@@ -191,7 +191,7 @@ fn layout(lines: &[(usize, Vec<&str>)]) -> Option<usize> {
         };
         lines.iter().filter(fits).count()
     };
-    (1..=MOST_NAMES).find(|&names| fitting(names) * 2 > lines.len())
+    (1..=MAX_NAMES).find(|&names| fitting(names) * 2 > lines.len())
 }
 
 /// A coordinate. Names can be numbers: a coordinate has a point or an exponent.

@@ -18,9 +18,9 @@ use super::error::{ImportError, Location};
 const SHEET: (u32, u32) = (1 << 20, 1 << 14);
 /// Cells of all sheets, including empty ones to the left of a used one and blank lines between used ones: 400,000 rows of
 /// forty columns.
-const MOST_CELLS: usize = 16_000_000;
+const MAX_CELLS: usize = 16_000_000;
 /// Text of all cells (bytes); any number of cells can share one string.
-const MOST_TEXT: usize = 128 << 20;
+const MAX_TEXT: usize = 128 << 20;
 /// Limit for repeated reads of the largest part by sheets that share it, in multiples of the unpacked limit.
 const SHARED: u64 = 4;
 
@@ -54,7 +54,7 @@ pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
                 expected: "sheets with parts of their own".into(),
             });
         }
-        let mut budget = Budget { cells: MOST_CELLS, text: MOST_TEXT };
+        let mut budget = Budget { cells: MAX_CELLS, text: MAX_TEXT };
         names.iter().map(|name| table(file, &mut workbook, name, &mut budget)).collect()
     }));
     read.unwrap_or_else(|_| Err(fail("its contents contradict each other".to_owned())))
@@ -73,8 +73,8 @@ impl Budget {
             return Err(ImportError::TooLarge {
                 location: location.clone(),
                 found: format!(
-                    "more than {MOST_CELLS} cells (including empty ones before a used one) or {} MB of text",
-                    MOST_TEXT >> 20
+                    "more than {MAX_CELLS} cells (including empty ones before a used one) or {} MB of text",
+                    MAX_TEXT >> 20
                 )
                 .into(),
                 expected: "one table that begins at the upper left of its sheet".into(),

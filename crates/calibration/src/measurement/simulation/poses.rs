@@ -14,7 +14,7 @@ use truegrind_math::work::checkpoint;
 /// Draws for each pose before the recipe counts as infeasible.
 const TRIES: usize = 10_000;
 /// Upper limit of all draws, or a hundred for each pose if that is more.
-const MOST_TRIES: usize = 5_000_000;
+const MAX_TRIES: usize = 5_000_000;
 
 /// One planned row.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,7 +104,7 @@ fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>,
             let mut rng = stream(recipe.seed, Stream::Poses);
             let mut poses = Vec::with_capacity(*count);
             let mut tries = 0;
-            let most = (TRIES * count).min(MOST_TRIES.max(100 * count));
+            let most = (TRIES * count).min(MAX_TRIES.max(100 * count));
             while poses.len() < *count && tries < most {
                 tries += 1;
                 let q = Joints::from_fn(|j, _| low[j] + (high[j] - low[j]) * rng.random::<f64>());

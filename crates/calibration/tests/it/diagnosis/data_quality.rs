@@ -267,7 +267,8 @@ fn a_station_that_moved_is_one_event() {
         let found = diagnosed(&dataset, &arm());
         let shift = finding(&found, "sensor-frame-shift").unwrap();
         assert_eq!((shift.rows, shift.confidence), (Some([130, 199]), Confidence::Identified), "{shift:?}");
-        let level = |other: &&Alternative| other.effect == shift.effect && other.beaten_by < 100.0;
+        let level =
+            |other: &&Alternative| other.effect == shift.effect && other.twice_log_bayes_factor < 100.0;
         assert_eq!(shift.alternatives.iter().find(level), None, "{shift:?}");
     }
 }

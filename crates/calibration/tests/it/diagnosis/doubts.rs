@@ -16,7 +16,7 @@ use truegrind_calibration::diagnosis::candidate_scores::CandidateScores;
 use truegrind_calibration::diagnosis::candidates::Catalogue;
 use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind_calibration::diagnosis::extension::{Extended, Freedom, Subject, fit};
+use truegrind_calibration::diagnosis::extension::{Extended, FreeParameters, Subject, fit};
 use truegrind_calibration::diagnosis::finding::Confidence;
 use truegrind_calibration::diagnosis::lump_direction::is_one_direction;
 use truegrind_calibration::diagnosis::preparation::prepare;
@@ -74,7 +74,7 @@ fn geometry(dataset: &Dataset) -> Extended {
         frames: &frames,
         tolerance: &options.tolerance,
     };
-    fit(&subject, &[], Freedom::All, None)
+    fit(&subject, &[], FreeParameters::All, None)
 }
 
 /// The mean over the rows of the square of what a millimetre counts.
@@ -148,8 +148,11 @@ fn the_first_joint_yields_only_where_another_shows_that_the_arm_leans() {
     };
     let catalogue = Catalogue::of(&subject);
     let tried = |causes: &[Cause]| {
-        let board =
-            CandidateScores::of(&catalogue, &subject, Arc::new(fit(&subject, causes, Freedom::All, None)));
+        let board = CandidateScores::of(
+            &catalogue,
+            &subject,
+            Arc::new(fit(&subject, causes, FreeParameters::All, None)),
+        );
         let all = board.score_all(&board.whole.design, true);
         all.iter().any(|s| s.candidate.cause.requires_tilt())
     };

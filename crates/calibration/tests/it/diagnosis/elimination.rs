@@ -10,7 +10,7 @@ use truegrind_calibration::diagnosis::design::Linear;
 use truegrind_calibration::diagnosis::diagnose::Options;
 use truegrind_calibration::diagnosis::discrepancy::Functions;
 use truegrind_calibration::diagnosis::elimination::{Criteria, Tested, eliminate};
-use truegrind_calibration::diagnosis::extension::{Freedom, Subject, fit};
+use truegrind_calibration::diagnosis::extension::{FreeParameters, Subject, fit};
 use truegrind_calibration::diagnosis::preparation::prepare;
 use truegrind_calibration::diagnosis::score::{log_p_of, score_columns};
 use truegrind_calibration::measurement::dataset::{Reading, Sensor};
@@ -55,7 +55,7 @@ fn compared(unknown: &[Hidden], correlated: bool) {
         tolerance: &options.tolerance,
     };
     let causes: Vec<Cause> = listed.iter().filter_map(scenarios::cause).collect();
-    let fitted = fit(&subject, &causes, Freedom::All, None);
+    let fitted = fit(&subject, &causes, FreeParameters::All, None);
     let linear = Linear::of(&subject, &fitted);
     let design = linear.whole().design;
     let functions = Functions::of(&subject, &linear);

@@ -12,7 +12,7 @@ use truegrind_calibration::diagnosis::catalogue::Candidate;
 use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::design::{Design, Linear, Slopes};
 use truegrind_calibration::diagnosis::diagnose::Options;
-use truegrind_calibration::diagnosis::extension::{Extended, Freedom, Subject, fit};
+use truegrind_calibration::diagnosis::extension::{Extended, FreeParameters, Subject, fit};
 use truegrind_calibration::diagnosis::held_out::FoldErrors;
 use truegrind_calibration::diagnosis::intervals::scan;
 use truegrind_calibration::diagnosis::levels::piecewise_levels;
@@ -163,7 +163,7 @@ fn fitted(rows: usize, then: impl FnOnce(&Subject<'_>, &Extended)) {
         tolerance: &options.tolerance,
     };
     let causes: Vec<Cause> = hidden.iter().filter_map(scenarios::cause).collect();
-    then(&subject, &fit(&subject, &causes, Freedom::All, None));
+    then(&subject, &fit(&subject, &causes, FreeParameters::All, None));
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn knots_that_no_row_reaches_are_not_searched_for_and_change_nothing() {
         seen.sort_unstable();
         seen.dedup();
         let causes = [Cause::Arm(Effect::GearMap(map))];
-        let found = fit(subject, &causes, Freedom::All, Some(fitted));
+        let found = fit(subject, &causes, FreeParameters::All, Some(fitted));
         assert!(seen.len() < 72, "all {} knots are reached", seen.len());
         let free = found.parameter_indices(0).into_iter().map(|k| match found.parameters[k] {
             Parameter::Effect { parameter, .. } => parameter,

@@ -15,7 +15,7 @@ use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::contribution::Contributions;
 use truegrind_calibration::diagnosis::design::Linear;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind_calibration::diagnosis::extension::{Freedom, Subject, fit};
+use truegrind_calibration::diagnosis::extension::{FreeParameters, Subject, fit};
 use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
 use truegrind_calibration::diagnosis::preparation::prepare;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
@@ -99,7 +99,7 @@ fn causes_of_one_finding_are_no_rivals_of_each_other() {
         tolerance: &options.tolerance,
     };
     let causes: Vec<Cause> = [gear(1.0), gear(1.15)].iter().filter_map(scenarios::cause).collect();
-    let fitted = fit(&subject, &causes, Freedom::All, None);
+    let fitted = fit(&subject, &causes, FreeParameters::All, None);
     let linear = Linear::of(&subject, &fitted);
     let whole = linear.whole();
     let contributions = Contributions::new(&subject, &fitted, &whole);

@@ -17,7 +17,7 @@ use truegrind_arm::model::Model;
 use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::design::Design;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind_calibration::diagnosis::extension::{Freedom, Subject, fit};
+use truegrind_calibration::diagnosis::extension::{FreeParameters, Subject, fit};
 use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
 use truegrind_calibration::diagnosis::validation::Validation;
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
@@ -203,7 +203,7 @@ pub fn outcome(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Outcome {
         truth.extend([1, 2].map(|joint| Cause::Arm(Effect::JointCompliance(yielding(joint)))));
     }
     let validation = Validation::of(&subject, &diagnosed.set_aside, 0, 10);
-    let true_structure = fit(&subject, &truth, Freedom::All, Some(&diagnosed.geometric));
+    let true_structure = fit(&subject, &truth, FreeParameters::All, Some(&diagnosed.geometric));
     let over_truth = diagnosed.diagnosis.fits.extended.cv_rmse_mm / validation.random_rmse(&true_structure);
     let within = compare(hidden, &diagnosed);
     Outcome {

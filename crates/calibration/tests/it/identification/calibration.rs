@@ -513,8 +513,8 @@ fn a_thinned_task_has_the_rows_that_were_chosen() {
 /// of them.
 #[test]
 fn a_row_among_very_many_is_the_same_as_among_few() {
-    const MANY: usize = 50_003;
-    let (few, many) = (task_with(Sensor::Position, 13, None), task_with(Sensor::Position, MANY, None));
+    const MANY_ROWS: usize = 50_003;
+    let (few, many) = (task_with(Sensor::Position, 13, None), task_with(Sensor::Position, MANY_ROWS, None));
     let x = vec![1e-5; few.parameters()];
     let rows = few.rows();
     let of = |problem: &dyn Problem| {
@@ -523,7 +523,7 @@ fn a_row_among_very_many_is_the_same_as_among_few() {
         r.into_iter().chain(j).collect::<Vec<_>>()
     };
     let wanted = of(&few);
-    let chosen: Vec<usize> = (0..13).chain([MANY - 1]).collect();
+    let chosen: Vec<usize> = (0..13).chain([MANY_ROWS - 1]).collect();
     let thinned = many.subsample(&chosen).unwrap();
     for found in [of(&many), of(&*thinned)] {
         for (found, wanted) in found.iter().zip(&wanted) {

@@ -4,7 +4,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_compensation::cell::Cell;
-use truegrind_compensation::deviation::Status;
+use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::frames::taught::contradictions;
 use truegrind_compensation::frames::taught::taught_tcp;
 use truegrind_compensation::options::Options;
@@ -38,7 +38,7 @@ fn immense_numbers_are_refused_by_line() {
         let refused = plan
             .outcomes
             .iter()
-            .filter(|o| o.status == Status::Refused && beyond.contains(&o.reason()))
+            .filter(|o| o.status == MotionStatus::Refused && beyond.contains(&o.reason()))
             .count();
         assert_eq!(refused, 5, "{size}: {:?}", plan.outcomes);
         let setup = Setup::default();

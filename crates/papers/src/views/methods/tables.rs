@@ -9,7 +9,7 @@ use crate::views::{named_causes, words};
 use truegrind_arm::parameter::display_unit;
 use truegrind_calibration::measurement::dataset::Sensor;
 use truegrind_math::statistics::median;
-use truegrind_report::document::Verdict;
+use truegrind_report::document::PageVerdict;
 use truegrind_report::number::Precision;
 use truegrind_report::repeated::{self, spread};
 use truegrind_report::status::Status;
@@ -117,8 +117,8 @@ pub(super) fn verdict_table(study: &Study) -> Table {
     table
 }
 
-pub(super) fn verdict(study: &Study) -> Verdict {
-    Verdict::new(Status::Good, words::headline(study), words::answer(study))
+pub(super) fn verdict(study: &Study) -> PageVerdict {
+    PageVerdict::new(Status::Good, words::headline(study), words::answer(study))
 }
 
 /// Each least-squares method as limited and after convergence.

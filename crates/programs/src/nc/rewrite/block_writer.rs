@@ -8,7 +8,7 @@ use crate::nc::syntax::{NcTree, Word, WordValue};
 use crate::nc::task::BlockContext;
 use crate::nc::token::Token;
 use crate::rapid::number;
-use crate::rewrite::Outcome;
+use crate::rewrite::RewriteOutcome;
 
 /// Changes smaller than this are numerical noise, whatever the decimals of the source.
 const NOISE: f64 = 1e-9;
@@ -24,7 +24,7 @@ pub(super) struct BlockWriter<'p, 's> {
     pub(super) end: u32,
     /// The words of a block that is inserted.
     pub(super) added: Vec<u8>,
-    pub(super) replaced: Outcome,
+    pub(super) replaced: RewriteOutcome,
     /// Whether words are separated by white space here.
     pub(super) spaced: bool,
     /// The token before which L must be inserted if a paraxial block of Heidenhain gets words.
@@ -47,16 +47,16 @@ impl<'p, 's: 'p> BlockWriter<'p, 's> {
             order: slots.order(),
             end: slots.end,
             added: Vec::new(),
-            replaced: Outcome::Unchanged,
+            replaced: RewriteOutcome::Unchanged,
             spaced: spaced(tree, slots.last),
             lead: slots.first.filter(|_| context.paraxial).map(|word| word.first),
         }
     }
 
     /// The outcome for the block.
-    pub(super) fn finish(mut self) -> Outcome {
+    pub(super) fn finish(mut self) -> RewriteOutcome {
         if let Some(token) = self.lead.take()
-            && self.replaced != Outcome::Unchanged
+            && self.replaced != RewriteOutcome::Unchanged
         {
             self.edits.insert(self.tree.start(token), b"L ");
         }
@@ -72,8 +72,8 @@ impl BlockWriter<'_, '_> {
             self.added.extend_from_slice(&text);
             return;
         }
-        if self.replaced == Outcome::Unchanged {
-            self.replaced = Outcome::InPlace;
+        if self.replaced == RewriteOutcome::Unchanged {
+            self.replaced = RewriteOutcome::InPlace;
         }
         match self.order[place + 1..].iter().flatten().next() {
             Some(next) => {
@@ -157,8 +157,8 @@ impl BlockWriter<'_, '_> {
                     }
                     number::write(out, value, decimals);
                 });
-                if self.replaced == Outcome::Unchanged {
-                    self.replaced = Outcome::InPlace;
+                if self.replaced == RewriteOutcome::Unchanged {
+                    self.replaced = RewriteOutcome::InPlace;
                 }
                 rounded
             }
@@ -177,7 +177,7 @@ impl BlockWriter<'_, '_> {
                 };
                 let rounded = number::rounded(value, least);
                 self.edits.replace_with(range, |out| number::write(out, value, least));
-                self.replaced = Outcome::Inlined;
+                self.replaced = RewriteOutcome::Inlined;
                 rounded
             }
             WordValue::Absent | WordValue::Arguments { .. } => keep,
@@ -197,5 +197,5 @@ fn decimals(text: &[u8]) -> u8 {
         return 0;
     }
     let point = text.iter().position(|byte| matches!(byte, b'.' | b','));
-    point.map_or(0, |point| (text.len() - point - 1).min(usize::from(number::MOST_DECIMALS)) as u8)
+    point.map_or(0, |point| (text.len() - point - 1).min(usize::from(number::MAX_DECIMALS)) as u8)
 }

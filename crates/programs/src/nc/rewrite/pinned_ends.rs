@@ -6,7 +6,7 @@ use super::keeps_endpoint;
 use super::word_slots::states_increment;
 use crate::motion::{MotionKind, Reason, WorkObjectValue};
 use crate::nc::task::{StartDependency, Task};
-use crate::rewrite::{Change, Outcome};
+use crate::rewrite::{Change, RewriteOutcome};
 
 /// Axes X, Y and Z as bits.
 const ALL: u8 = 0b111;
@@ -51,7 +51,7 @@ impl Task<'_> {
         &self,
         changes: &[Change],
         wanted: &mut HashMap<u32, usize>,
-        outcomes: &mut [Outcome],
+        outcomes: &mut [RewriteOutcome],
     ) -> BTreeSet<u32> {
         let mut pinned = BTreeSet::new();
         let mut refused = BTreeSet::new();
@@ -85,7 +85,7 @@ impl Task<'_> {
                 Some(change) => {
                     wanted.remove(&before);
                     let arc = motion.kind == MotionKind::Circular;
-                    outcomes[change] = Outcome::Refused(match arc {
+                    outcomes[change] = RewriteOutcome::Refused(match arc {
                         true => Reason::BeforeUnmodifiedArc,
                         false => Reason::BeforeUnmodifiedPath,
                     });

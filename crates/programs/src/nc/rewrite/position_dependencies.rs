@@ -16,7 +16,7 @@ use crate::nc::dialect::Dialect;
 use crate::nc::expression::literal;
 use crate::nc::syntax::{NcTree, Word, WordValue};
 use crate::nc::task::{StartDependency, StateEvent, Task};
-use crate::rewrite::Outcome;
+use crate::rewrite::RewriteOutcome;
 
 /// The most motions in one dependency set; beyond it the set is all motions of the file.
 const SINGLE: usize = 4;
@@ -219,7 +219,7 @@ impl Task<'_> {
         &self,
         pinned: &BTreeSet<u32>,
         wanted: &mut HashMap<u32, usize>,
-        outcomes: &mut [Outcome],
+        outcomes: &mut [RewriteOutcome],
     ) -> bool {
         let mut state = FileDependencies::default();
         let mut refused: Vec<(u32, Reason)> = Vec::new();
@@ -256,7 +256,7 @@ impl Task<'_> {
         let mut any = false;
         for (motion, reason) in refused {
             if let Some(change) = wanted.remove(&motion) {
-                outcomes[change] = Outcome::Refused(reason);
+                outcomes[change] = RewriteOutcome::Refused(reason);
                 any = true;
             }
         }

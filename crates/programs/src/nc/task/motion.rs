@@ -14,7 +14,7 @@ use super::super::syntax::{Word, WordValue};
 use super::turn::{Turn, turn_between};
 use super::{Block, BlockArc, BlockContext, FlowPoint, Interpreter, StartDependency, StateEvent};
 use crate::motion::{
-    FARTHEST_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
+    MAX_POSITION_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
     SpeedValue, Switch, TargetValue, Zone, ZoneValue,
 };
 use truegrind_math::option_f64::OptionF64;
@@ -694,7 +694,7 @@ type Rotation = Result<UnitQuaternion<f64>, Reason>;
 /// The target at this position and orientation.
 fn target(position: [Evaluated; 3], rotation: Rotation) -> Result<TargetValue, Reason> {
     let position_mm = all_known(position)?;
-    if !position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM) {
+    if !position_mm.iter().all(|coordinate| coordinate.abs() <= MAX_POSITION_MM) {
         return Err(Reason::BeyondReach);
     }
     let q = rotation?;

@@ -1,7 +1,7 @@
 //! Collects the words of a block, and evaluates their values.
 
 use super::super::dialect::Dialect;
-use super::super::expression::{Evaluated, Evaluator, LARGEST, Variable, literal};
+use super::super::expression::{Evaluated, Evaluator, MAX_NUMBER, Variable, literal};
 use super::super::modal_group::ModalGroup;
 use super::super::parser::word;
 use super::super::syntax::{Syntax, Word, WordValue};
@@ -12,7 +12,7 @@ use crate::tree::Node;
 
 /// A value that a control can represent.
 fn in_range(value: Evaluated) -> Evaluated {
-    value.and_then(|value| if value.abs() < LARGEST { Ok(value) } else { Err(Reason::NumberRange) })
+    value.and_then(|value| if value.abs() < MAX_NUMBER { Ok(value) } else { Err(Reason::NumberRange) })
 }
 
 /// The largest number of words that is read; controls take some hundred characters.

@@ -11,7 +11,7 @@ use crate::tree::Child;
 
 /// Where a target's numbers are written, before declarations are indexed in the listing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Source {
+pub enum ValueOrigin {
     /// The literal in the instruction.
     Inline,
     /// A declared name.
@@ -33,20 +33,20 @@ impl<'s> Evaluator<'_, 's> {
         context: Context<'_>,
         argument: Child,
         joints: bool,
-    ) -> (Result<TargetValue, Reason>, Source) {
+    ) -> (Result<TargetValue, Reason>, ValueOrigin) {
         let tree = self.tree(context.file);
         self.may_raise.set(false);
         match argument {
             Child::Node(node) if tree.nodes.kind(node) == Syntax::Aggregate => {
                 if let Some(value) = literal_target(tree.node_text(node), joints) {
-                    let source = if value.is_ok() { Source::Inline } else { Source::Unknown };
+                    let source = if value.is_ok() { ValueOrigin::Inline } else { ValueOrigin::Unknown };
                     return (value, source);
                 }
             }
             Child::Token(token) => match tree.kind(token) {
                 Some(Token::Ident) => return self.named_target(context, tree.text(token), joints),
                 Some(Token::Placeholder | Token::Star) => {
-                    return (Err(Reason::Placeholder), Source::Unknown);
+                    return (Err(Reason::Placeholder), ValueOrigin::Unknown);
                 }
                 _ => {}
             },
@@ -62,7 +62,7 @@ impl<'s> Evaluator<'_, 's> {
             }
         }
         let value = self.value(context, argument).target(joints);
-        let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+        let source = if value.is_ok() { ValueOrigin::Computed } else { ValueOrigin::Unknown };
         (value, source)
     }
 
@@ -72,7 +72,7 @@ impl<'s> Evaluator<'_, 's> {
         context: Context<'_>,
         tree: &RapidTree<'s>,
         node: u32,
-    ) -> Option<(Result<TargetValue, Reason>, Source)> {
+    ) -> Option<(Result<TargetValue, Reason>, ValueOrigin)> {
         if tree.nodes.kind(node) != Syntax::Function {
             return None;
         }
@@ -87,7 +87,7 @@ impl<'s> Evaluator<'_, 's> {
         let value = self.function(context, tree, node).target(false);
         let read = self.persistent.replace(Persistent::Unknown) == Persistent::Read;
         let Some(to) = value.ok().filter(|_| read) else {
-            let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+            let source = if value.is_ok() { ValueOrigin::Computed } else { ValueOrigin::Unknown };
             return Some((value, source));
         };
         let to = to.cartesian()?.pose();
@@ -95,7 +95,7 @@ impl<'s> Evaluator<'_, 's> {
             true => Offset::OfTool(from.inverse() * to),
             false => Offset::OfObject((to.translation.vector - from.translation.vector).into()),
         };
-        Some((value, Source::Offset(base, offset)))
+        Some((value, ValueOrigin::Offset(base, offset)))
     }
 
     fn named_target(
@@ -103,8 +103,8 @@ impl<'s> Evaluator<'_, 's> {
         context: Context<'_>,
         name: &[u8],
         joints: bool,
-    ) -> (Result<TargetValue, Reason>, Source) {
-        let unknown = |reason| (Err(reason), Source::Unknown);
+    ) -> (Result<TargetValue, Reason>, ValueOrigin) {
+        let unknown = |reason| (Err(reason), ValueOrigin::Unknown);
         let Some(id) = self.symbols.find(context.scope, name) else {
             return unknown(Reason::Undeclared);
         };
@@ -113,7 +113,7 @@ impl<'s> Evaluator<'_, 's> {
             SymbolKind::Data(data) => data,
             SymbolKind::Parameter if context.known.contains_key(&id) => {
                 let value = self.symbol_value(context, id).target(joints);
-                let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+                let source = if value.is_ok() { ValueOrigin::Computed } else { ValueOrigin::Unknown };
                 return (value, source);
             }
             SymbolKind::Parameter => return unknown(Reason::Parameter),
@@ -129,7 +129,7 @@ impl<'s> Evaluator<'_, 's> {
         }
         if symbol.assigned || context.known.contains_key(&id) {
             let value = self.symbol_value(context, id).target(joints);
-            let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+            let source = if value.is_ok() { ValueOrigin::Computed } else { ValueOrigin::Unknown };
             return (value, source);
         }
         let Some(initial) = data.value else { return unknown(Reason::Uninitialised) };
@@ -137,7 +137,7 @@ impl<'s> Evaluator<'_, 's> {
             Some(value) => value,
             None => self.symbol_value(context, id).target(joints),
         };
-        let source = if value.is_ok() { Source::Symbol(id) } else { Source::Unknown };
+        let source = if value.is_ok() { ValueOrigin::Symbol(id) } else { ValueOrigin::Unknown };
         (value, source)
     }
 
@@ -147,7 +147,7 @@ impl<'s> Evaluator<'_, 's> {
         context: Context<'_>,
         node: u32,
         joints: bool,
-    ) -> Option<(Result<TargetValue, Reason>, Source)> {
+    ) -> Option<(Result<TargetValue, Reason>, ValueOrigin)> {
         let tree = self.tree(context.file);
         let mut parts = parts(tree, node);
         let root = self.symbols.root(tree, context.scope, parts.next()?)?;
@@ -162,7 +162,7 @@ impl<'s> Evaluator<'_, 's> {
         let Child::Node(index) = index else { return None };
         let (file, element) = match self.element(context, root, index) {
             Ok(found) => found,
-            Err(reason) => return Some((Err(reason), Source::Unknown)),
+            Err(reason) => return Some((Err(reason), ValueOrigin::Unknown)),
         };
         let text = text_of(self.tree(file), element);
         let (first, end) = tokens_of(self.tree(file), element);
@@ -171,8 +171,8 @@ impl<'s> Evaluator<'_, 's> {
             None => self.value(self.declaration_context(context, symbol.scope, file), element).target(joints),
         };
         let source = match value {
-            Ok(_) => Source::Element(root, self.tree(file).span(first, end)),
-            Err(_) => Source::Unknown,
+            Ok(_) => ValueOrigin::Element(root, self.tree(file).span(first, end)),
+            Err(_) => ValueOrigin::Unknown,
         };
         Some((value, source))
     }

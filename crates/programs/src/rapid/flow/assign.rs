@@ -20,12 +20,12 @@ impl Interpreter<'_, '_, '_> {
     ) -> Option<(Child, Value)> {
         let is = |wanted: &[u8]| same_name(name, wanted);
         if !(is(b"Incr") || is(b"Decr") || is(b"Add") || is(b"Clear"))
-            || self.evaluator.symbols.routine(self.unit.scope, name).is_some()
+            || self.evaluator.symbols.routine(self.body.scope, name).is_some()
         {
             return None;
         }
-        let tree = &self.evaluator.trees[self.unit.file as usize];
-        let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+        let tree = &self.evaluator.trees[self.body.file as usize];
+        let context = Context::new(self.body.file, self.body.scope, &state.known);
         let mut given = arguments(tree, node).filter(|argument| !argument.optional);
         let place = given.next()?.value?;
         let old = self.evaluator.value(context, place).number().ok();
@@ -46,14 +46,14 @@ impl Interpreter<'_, '_, '_> {
 
     /// `place := value;`
     pub(super) fn transfer_assignment(&mut self, node: u32, state: &mut AbstractState) {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         let mut sides = parts(tree, node)
             .filter(|&part| !matches!(token_kind(tree, part), Some(Token::Assign | Token::Semicolon)));
         let (Some(place), Some(expression)) = (sides.next(), sides.next()) else { return };
         for inside in tree.child_nodes(node) {
             self.invalidate_changed(inside, state);
         }
-        let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+        let context = Context::new(self.body.file, self.body.scope, &state.known);
         let value = self.evaluator.value(context, expression);
         // TRYNEXT skips an assignment that raises an error.
         let skipped =
@@ -66,21 +66,21 @@ impl Interpreter<'_, '_, '_> {
 
     /// Whether an expression calls a function of the program, which may raise an error.
     fn may_fail(&self, part: Child) -> bool {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         let Child::Node(node) = part else { return false };
         (node..tree.nodes.subtree_end(node)).any(|node| {
             let name = tree.text(tree.nodes.first(node));
             tree.nodes.kind(node) == Syntax::Function
-                && self.evaluator.symbols.routine(self.unit.scope, name).is_some()
+                && self.evaluator.symbols.routine(self.body.scope, name).is_some()
         })
     }
 
     /// Stores a value in a place.
     pub(super) fn store(&self, place: Child, value: Value, state: &mut AbstractState) {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         let symbols = self.evaluator.symbols;
-        let Some(root) = symbols.root(tree, self.unit.scope, place) else { return };
-        let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+        let Some(root) = symbols.root(tree, self.body.scope, place) else { return };
+        let context = Context::new(self.body.file, self.body.scope, &state.known);
         let new = match place {
             Child::Token(_) => value,
             Child::Node(place) => {
@@ -135,7 +135,7 @@ impl Interpreter<'_, '_, '_> {
         path: &[Child],
         value: Value,
     ) -> Value {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         let Some((&step, rest)) = path.split_first() else { return value };
         match step {
             Child::Token(token) if tree.kind(token) == Some(Token::Ident) => {

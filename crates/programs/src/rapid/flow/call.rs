@@ -37,13 +37,13 @@ impl Interpreter<'_, '_, '_> {
         }
         if self.resumes {
             // RETRY may call it again after an error in it.
-            self.join_switches(symbols.late_switches_of(self.unit), state);
+            self.join_switches(symbols.late_switches_of(self.body), state);
         }
         self.visitor.record_late_call(state.modal);
-        if symbols.late_callees_of(self.unit).is_empty() {
+        if symbols.late_callees_of(self.body).is_empty() {
             self.visitor.record_external_call(state.modal);
         }
-        self.join_switches(symbols.late_switches_of(self.unit), state);
+        self.join_switches(symbols.late_switches_of(self.body), state);
         self.invalidate_nonlocal(state);
         state.previous = None;
         if self.tracks_motions {

@@ -14,7 +14,7 @@ use crate::rapid::value::Value;
 impl Interpreter<'_, '_, '_> {
     /// Invalidates everything that statements under a node may write: assignments, output arguments, side effects of callees.
     pub(super) fn invalidate_changed(&mut self, node: u32, state: &mut AbstractState) {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         let symbols = self.evaluator.symbols;
         for node in node..tree.nodes.subtree_end(node) {
             let kind = tree.nodes.kind(node);
@@ -30,7 +30,7 @@ impl Interpreter<'_, '_, '_> {
                     if self.may_grip(node) {
                         state.gripped = Gripped::UNKNOWN;
                     }
-                    for &routine in symbols.callees(self.unit.scope, name) {
+                    for &routine in symbols.callees(self.body.scope, name) {
                         let sets = symbols.effects_of(routine).switches;
                         if self.resumes {
                             // RETRY may call it again after an error in it.
@@ -41,7 +41,7 @@ impl Interpreter<'_, '_, '_> {
                         self.visitor.record_call(CallSite { routine, modal, gripped });
                         self.join_switches(sets, state);
                     }
-                    self.after_calls(symbols.callees(self.unit.scope, name), true, state);
+                    self.after_calls(symbols.callees(self.body.scope, name), true, state);
                     self.invalidate_called(name, kind, state);
                 }
                 _ => {}
@@ -57,7 +57,7 @@ impl Interpreter<'_, '_, '_> {
 
     /// Whether a statement or function may change the gripped load.
     pub(super) fn may_grip(&self, node: u32) -> bool {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         let symbols = self.evaluator.symbols;
         let any_grips = |routines: &[u32]| routines.iter().any(|routine| symbols.effects_of(*routine).grips);
         let found = tree.nodes.get(node);
@@ -65,8 +65,8 @@ impl Interpreter<'_, '_, '_> {
             Syntax::LateCall | Syntax::Opaque => true,
             Syntax::Call | Syntax::Function => {
                 let name = tree.text(found.first);
-                match symbols.callees(self.unit.scope, name) {
-                    [] if predefined::calls_by_name(name) => any_grips(symbols.late_callees_of(self.unit)),
+                match symbols.callees(self.body.scope, name) {
+                    [] if predefined::calls_by_name(name) => any_grips(symbols.late_callees_of(self.body)),
                     [] => found.kind == Syntax::Call && predefined::grips(name),
                     called => any_grips(called),
                 }
@@ -77,10 +77,10 @@ impl Interpreter<'_, '_, '_> {
 
     /// Invalidates what one statement or function writes, callees not counted.
     pub(super) fn invalidate_written(&self, node: u32, state: &mut AbstractState) {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let tree = &self.evaluator.trees[self.body.file as usize];
         let symbols = self.evaluator.symbols;
         symbols
-            .for_each_write(tree, self.unit.scope, node, &mut |write| self.invalidate(write.symbol, state));
+            .for_each_write(tree, self.body.scope, node, &mut |write| self.invalidate(write.symbol, state));
     }
 
     /// Invalidates data and its possible aliases.
@@ -92,7 +92,7 @@ impl Interpreter<'_, '_, '_> {
         let symbols = &self.evaluator.symbols.symbols;
         if self.aliases.contains(&symbol) {
             self.invalidate_nonlocal(state);
-        } else if symbols[symbol as usize].scope != self.unit.scope {
+        } else if symbols[symbol as usize].scope != self.body.scope {
             for alias in &self.aliases {
                 state.known.remove(alias);
             }
@@ -121,10 +121,10 @@ impl Interpreter<'_, '_, '_> {
     /// Invalidates what a routine or instruction may write apart from its arguments.
     pub(super) fn invalidate_called(&self, name: &[u8], kind: Syntax, state: &mut AbstractState) {
         let symbols = self.evaluator.symbols;
-        if kind == Syntax::Call && symbols.is_motion(self.unit.scope, name) {
+        if kind == Syntax::Call && symbols.is_motion(self.body.scope, name) {
             return;
         }
-        let moves = match symbols.callees(self.unit.scope, name) {
+        let moves = match symbols.callees(self.body.scope, name) {
             called @ [_, ..] => {
                 let mut moves = false;
                 for &routine in called {
@@ -163,11 +163,11 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// Invalidates everything declared outside the unit, which unknown code may write.
+    /// Invalidates everything declared outside the body, which unknown code may write.
     pub(super) fn invalidate_nonlocal(&self, state: &mut AbstractState) {
         let symbols = &self.evaluator.symbols.symbols;
         state.known.retain(|&id, _| {
-            symbols.get(id as usize).is_none_or(|s| s.scope == self.unit.scope) && !self.aliases.contains(&id)
+            symbols.get(id as usize).is_none_or(|s| s.scope == self.body.scope) && !self.aliases.contains(&id)
         });
     }
 }

@@ -3,7 +3,7 @@
 use super::{Rewriter, circle_point, fresh, indent, instruction_of, written_as};
 use crate::edit::Edits;
 use crate::motion::{Motion, MotionKind, Role, Span, TargetValue};
-use crate::rapid::instruction::{Between, Instruction, Slot};
+use crate::rapid::instruction::{InsertedForm, Instruction, Slot};
 use crate::rapid::mark;
 use crate::rapid::parser::parse_statement;
 use crate::rapid::print;
@@ -54,10 +54,10 @@ impl Rewriter<'_, '_> {
         let statement = &source[motion.statement.range()];
         let mut target = Vec::new();
         print::literal(&mut target, &value, self.options);
-        let same = match instruction.between {
-            Between::Same => Some(instruction.name),
-            Between::Other(name) => Some(name),
-            Between::Plain | Between::Nothing => None,
+        let same = match instruction.inserted {
+            InsertedForm::Same => Some(instruction.name),
+            InsertedForm::Other(name) => Some(name),
+            InsertedForm::Plain | InsertedForm::Nothing => None,
         };
         let Some(name) = same else {
             self.plain(out, extra.kind, &target, statement, parts);

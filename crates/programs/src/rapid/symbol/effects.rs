@@ -15,7 +15,7 @@ pub enum WriteKind {
     /// One component: the node of the assigned place.
     Part(u32),
     /// Passed to a routine that none of the files declares or that is called by a computed name.
-    HandedOver,
+    Escaped,
     /// At any time from here on: the controller keeps a reference and writes it when an event occurs.
     Later,
 }

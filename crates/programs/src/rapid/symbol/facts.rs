@@ -1,4 +1,4 @@
-//! Facts about each unit that need no fixpoint: one pass over every assignment, call and function, callees not included.
+//! Facts about each body that need no fixpoint: one pass over every assignment, call and function, callees not included.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -8,18 +8,18 @@ use rayon::prelude::*;
 use super::effects::{SideEffects, Write};
 use super::late_binding::NamePattern;
 use super::writes::literal_data_name;
-use super::{Symbols, Unit};
+use super::{Body, Symbols};
 use crate::dataflow::Lattice;
-use crate::rapid::instruction::{self, Also, INSTRUCTIONS};
+use crate::rapid::instruction::{self, INSTRUCTIONS, SideEffect};
 use crate::rapid::modal::switches_set_by;
 use crate::rapid::predefined;
 use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, parts};
 use crate::rapid::token::{Token, folded, same_name};
 use crate::tree::Child;
 
-/// What the statements of one unit do themselves.
+/// What the statements of one body do themselves.
 #[derive(Default)]
-pub(super) struct UnitFacts {
+pub(super) struct BodyFacts {
     pub(super) writes: Vec<Write>,
     /// The routines that it calls: its edges in the call graph.
     pub(super) calls: Vec<u32>,
@@ -37,9 +37,9 @@ pub(super) struct UnitFacts {
     pub(super) restarts_main: bool,
 }
 
-impl UnitFacts {
-    /// These facts and those of the next nodes of the same unit.
-    fn merge(mut self, next: UnitFacts) -> UnitFacts {
+impl BodyFacts {
+    /// These facts and those of the next nodes of the same body.
+    fn merge(mut self, next: BodyFacts) -> BodyFacts {
         self.writes.extend(next.writes);
         self.calls.extend(next.calls);
         self.switch_calls.extend(next.switch_calls);
@@ -59,71 +59,70 @@ impl UnitFacts {
 }
 
 /// Nodes that one thread processes at a time.
-const PORTION: u32 = 1 << 16;
+const CHUNK: u32 = 1 << 16;
 
 impl Symbols {
-    /// The facts of every unit.
-    pub(super) fn collect_facts(&self, trees: &[RapidTree<'_>]) -> Vec<UnitFacts> {
-        let facts = |&unit: &Unit| {
-            let nodes = unit.node + 1..trees[unit.file as usize].nodes.subtree_end(unit.node);
+    /// The facts of every body.
+    pub(super) fn collect_facts(&self, trees: &[RapidTree<'_>]) -> Vec<BodyFacts> {
+        let facts = |&body: &Body| {
+            let nodes = body.node + 1..trees[body.file as usize].nodes.subtree_end(body.node);
             // The parts of a long routine in parallel; a fragment skips whole routines, so it stays in one piece.
-            let parts =
-                if unit.routine.is_some() { nodes.len().div_ceil(PORTION as usize).max(1) } else { 1 };
+            let parts = if body.routine.is_some() { nodes.len().div_ceil(CHUNK as usize).max(1) } else { 1 };
             if parts == 1 {
-                return self.facts_of(trees, unit, nodes);
+                return self.facts_of(trees, body, nodes);
             }
             let part = |index: usize| {
-                let first = nodes.start + index as u32 * PORTION;
-                self.facts_of(trees, unit, first..(first + PORTION).min(nodes.end))
+                let first = nodes.start + index as u32 * CHUNK;
+                self.facts_of(trees, body, first..(first + CHUNK).min(nodes.end))
             };
-            let mut parts: Vec<UnitFacts> = (0..parts).into_par_iter().map(part).collect();
+            let mut parts: Vec<BodyFacts> = (0..parts).into_par_iter().map(part).collect();
             let rest = parts.split_off(1);
-            rest.into_iter().fold(parts.swap_remove(0), UnitFacts::merge)
+            rest.into_iter().fold(parts.swap_remove(0), BodyFacts::merge)
         };
-        self.units.iter().map(facts).collect()
+        self.bodies.iter().map(facts).collect()
     }
 
-    /// The facts of some nodes of a unit.
-    pub(super) fn facts_of(&self, trees: &[RapidTree<'_>], unit: Unit, nodes: Range<u32>) -> UnitFacts {
-        let tree = &trees[unit.file as usize];
-        let mut facts = UnitFacts::default();
+    /// The facts of some nodes of a body.
+    pub(super) fn facts_of(&self, trees: &[RapidTree<'_>], body: Body, nodes: Range<u32>) -> BodyFacts {
+        let tree = &trees[body.file as usize];
+        let mut facts = BodyFacts::default();
         let mut node = nodes.start;
         while node < nodes.end {
             let kind = tree.nodes.kind(node);
-            if unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) {
+            if body.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) {
                 node = tree.nodes.subtree_end(node);
                 continue;
             }
-            if kind == Syntax::Call && self.is_plain_motion(tree, unit.scope, node) {
+            if kind == Syntax::Call && self.is_plain_motion(tree, body.scope, node) {
                 (facts.effects.moves, facts.effects.impure) = (true, true);
                 node += 1;
                 continue;
             }
             if kind.may_change() {
-                self.for_each_write(tree, unit.scope, node, &mut |write| facts.writes.push(write));
+                self.for_each_write(tree, body.scope, node, &mut |write| facts.writes.push(write));
             }
             match kind {
                 Syntax::LateCall => {
                     let name = parts(tree, node).nth(1);
                     add_late_call(tree, (node, name), &mut facts);
                 }
-                Syntax::Call | Syntax::Function => self.add_call(tree, unit, (node, kind), &mut facts),
+                Syntax::Call | Syntax::Function => self.add_call(tree, body, (node, kind), &mut facts),
                 // The condition may depend on another task.
                 Syntax::While => facts.effects.waits = true,
                 _ => {}
             }
-            facts.effects.decides_by_position |= self.position_decisions.contains(&(unit.file, node));
-            facts.effects.impure |= self.is_node_impure(tree, unit.scope, node);
+            facts.effects.decides_by_position |= self.position_decisions.contains(&(body.file, node));
+            facts.effects.impure |= self.is_node_impure(tree, body.scope, node);
             node += 1;
         }
         facts
     }
 
     /// A call or function, other than an instruction that only moves the robot.
-    fn add_call(&self, tree: &RapidTree<'_>, unit: Unit, (node, kind): (u32, Syntax), facts: &mut UnitFacts) {
+    fn add_call(&self, tree: &RapidTree<'_>, body: Body, (node, kind): (u32, Syntax), facts: &mut BodyFacts) {
         let name = tree.text(tree.nodes.first(node));
         let is_call = kind == Syntax::Call;
-        let callees = self.callees(unit.scope, name);
+        let callees = self.callees(body.scope, name);
         if is_call
             && callees.is_empty()
             && let Some(switches) = switches_set_by(tree, node, name)
@@ -131,9 +130,11 @@ impl Symbols {
             facts.add_switch_call(node);
             facts.effects.switches = facts.effects.switches.join(switches);
         }
-        if is_call && self.is_motion(unit.scope, name) {
+        if is_call && self.is_motion(body.scope, name) {
             facts.effects.moves = true;
-            if instruction::find(name).is_some_and(|known| INSTRUCTIONS[known].also == Also::Calls) {
+            if instruction::find(name)
+                .is_some_and(|known| INSTRUCTIONS[known].side_effect == SideEffect::Calls)
+            {
                 let name = arguments(tree, node).filter(|argument| !argument.optional).last();
                 facts.interrupts.insert(NamePattern::of(tree, (name.and_then(|name| name.value), 0, false)));
             }
@@ -158,9 +159,9 @@ impl Symbols {
                 facts.effects.waits |= predefined::waits(name);
                 facts.effects.grips |= predefined::grips(name);
                 // It may write data of any caller.
-                facts.effects.writes_anything |= self.writes_unknown_data(tree, unit.scope, node, name);
+                facts.effects.writes_anything |= self.writes_unknown_data(tree, body.scope, node, name);
                 if name.eq_ignore_ascii_case(b"SetAllDataVal") {
-                    let type_name = |name| self.resolved_type(unit.scope, &folded(name)).to_vec();
+                    let type_name = |name| self.resolved_type(body.scope, &folded(name)).to_vec();
                     facts.writes_by_name.push(literal_data_name(tree, node).map(type_name));
                 } else if name.eq_ignore_ascii_case(b"SetDataVal") && literal_data_name(tree, node).is_none()
                 {
@@ -177,41 +178,41 @@ impl Symbols {
         by_name && self.routine(scope, name).is_none()
     }
 
-    /// Whether the robot may move between two statements of a unit: by an error handler that resumes, or by an interrupt
+    /// Whether the robot may move between two statements of a body: by an error handler that resumes, or by an interrupt
     /// routine that does not store the path.
-    pub fn may_move_between_statements(&self, trees: &[RapidTree<'_>], unit: Unit) -> bool {
+    pub fn may_move_between_statements(&self, trees: &[RapidTree<'_>], body: Body) -> bool {
         if self.interrupts_move_robot {
             return true;
         }
-        let tree = &trees[unit.file as usize];
+        let tree = &trees[body.file as usize];
         let moves = |node: u32| {
             let name = tree.text(tree.nodes.first(node));
             match tree.nodes.kind(node) {
                 Syntax::LateCall => true,
-                Syntax::Call if self.is_motion(unit.scope, name) => true,
-                Syntax::Call | Syntax::Function => match self.callees(unit.scope, name) {
+                Syntax::Call if self.is_motion(body.scope, name) => true,
+                Syntax::Call | Syntax::Function => match self.callees(body.scope, name) {
                     callees @ [_, ..] => callees.iter().any(|callee| self.effects_of(*callee).moves),
                     [] => predefined::displaces(name).is_some() || predefined::effect(name).is_none(),
                 },
                 _ => false,
             }
         };
-        let mut clauses = tree.child_nodes(unit.node).filter(|&clause| is_resuming_handler(tree, clause));
+        let mut clauses = tree.child_nodes(body.node).filter(|&clause| is_resuming_handler(tree, clause));
         clauses.any(|clause| (clause..tree.nodes.subtree_end(clause)).any(moves))
     }
 
     /// Whether an interrupt routine moves the robot without storing the path.
     pub(super) fn find_moving_interrupts(&self, trees: &[RapidTree<'_>]) -> bool {
-        let stores_path = |unit: Unit| {
-            let tree = &trees[unit.file as usize];
-            (unit.node..tree.nodes.subtree_end(unit.node)).any(|node| {
+        let stores_path = |body: Body| {
+            let tree = &trees[body.file as usize];
+            (body.node..tree.nodes.subtree_end(body.node)).any(|node| {
                 let node = tree.nodes.get(node);
                 node.kind == Syntax::Call && same_name(tree.text(node.first), b"StorePath")
             })
         };
         self.interrupt_routines.iter().any(|&routine| {
             let routine = &self.routines[routine as usize];
-            routine.effects.moves && !stores_path(self.units[routine.unit as usize])
+            routine.effects.moves && !stores_path(self.bodies[routine.body as usize])
         })
     }
 
@@ -229,7 +230,7 @@ impl Symbols {
 }
 
 /// A call by a computed name.
-fn add_late_call(tree: &RapidTree<'_>, (node, name): (u32, Option<Child>), facts: &mut UnitFacts) {
+fn add_late_call(tree: &RapidTree<'_>, (node, name): (u32, Option<Child>), facts: &mut BodyFacts) {
     (facts.effects.writes_anything, facts.effects.moves) = (true, true);
     facts.add_switch_call(node);
     // CallByVar appends a number to the name that it is given.
@@ -262,8 +263,8 @@ pub(crate) fn is_resuming_handler(tree: &RapidTree<'_>, clause: u32) -> bool {
 /// Whether anything in the files has the name of GripLoad or of the option TLoad.
 pub(super) fn name_loads(trees: &[RapidTree<'_>]) -> bool {
     trees.iter().any(|tree| {
-        tree.kinds().par_chunks(PORTION as usize).enumerate().any(|(portion, kinds)| {
-            let names = (portion as u32 * PORTION..).zip(kinds).filter(|(_, kind)| **kind == Token::Ident);
+        tree.kinds().par_chunks(CHUNK as usize).enumerate().any(|(chunk, kinds)| {
+            let names = (chunk as u32 * CHUNK..).zip(kinds).filter(|(_, kind)| **kind == Token::Ident);
             let mut texts = names.map(|(token, _)| tree.text(token));
             texts.any(|text| same_name(text, b"GripLoad") || same_name(text, b"TLoad"))
         })

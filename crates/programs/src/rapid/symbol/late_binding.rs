@@ -1,7 +1,7 @@
 //! Late binding: which procedures a computed name may call, from the text at its beginning and end and the number of arguments.
 //!
 //! Method: all names sorted twice, forwards and reversed; a pattern scans the shorter of its two matching ranges. Equal
-//! patterns, and units with the same patterns, share one list.
+//! patterns, and bodies with the same patterns, share one list.
 
 use std::collections::{BTreeSet, HashMap};
 

@@ -1,4 +1,4 @@
-//! Interprocedural side effects: fixpoints over the call graph, on the facts of each unit.
+//! Interprocedural side effects: fixpoints over the call graph, on the facts of each body.
 //!
 //! Method: flow-insensitive may-analysis. Two least fixpoints ([`propagate`]): which parameters by reference are written, then the
 //! side-effect summary of each routine. Unknown code (a routine that no file declares) and a call by a computed name may write
@@ -8,10 +8,10 @@
 use std::collections::HashSet;
 
 use super::effects::{SideEffects, Write, WriteKind};
-use super::facts::{UnitFacts, is_resuming_handler, name_loads};
+use super::facts::{BodyFacts, is_resuming_handler, name_loads};
 use super::late_binding::ProcedureIndex;
 use super::writes::component_path;
-use super::{Symbol, SymbolKind, Symbols, Unit};
+use super::{Body, Symbol, SymbolKind, Symbols};
 use crate::dataflow::{Edge, Lattice, post_order, propagate};
 use crate::motion::Reason;
 use crate::rapid::syntax::{RapidTree, Syntax};
@@ -32,8 +32,8 @@ impl Symbols {
         }
         let mut all = self.collect_facts(trees);
         let calls =
-            (0..).zip(&all).flat_map(|(unit, facts)| facts.calls.iter().map(move |&callee| (unit, callee)));
-        let calls: Vec<Edge<()>> = calls.map(|(unit, callee)| (unit, self.unit_of(callee), ())).collect();
+            (0..).zip(&all).flat_map(|(body, facts)| facts.calls.iter().map(move |&callee| (body, callee)));
+        let calls: Vec<Edge<()>> = calls.map(|(body, callee)| (body, self.body_of(callee), ())).collect();
         self.callees_first = post_order(all.len(), &calls);
         if self.solve_parameter_writes(trees) {
             // Calls write more than their own text shows.
@@ -45,9 +45,9 @@ impl Symbols {
             written.dedup();
             self.written.push(written);
         }
-        for (facts, unit) in all.iter().zip(self.units.clone()) {
+        for (facts, body) in all.iter().zip(self.bodies.clone()) {
             for write in &facts.writes {
-                self.record_write(&trees[unit.file as usize], write);
+                self.record_write(&trees[body.file as usize], write);
             }
         }
         self.record_writes_by_name(&all);
@@ -79,10 +79,10 @@ impl Symbols {
 
     fn record_write(&mut self, tree: &RapidTree<'_>, write: &Write) {
         let symbol = &mut self.symbols[write.symbol as usize];
-        let handed_over = write.kind == WriteKind::HandedOver;
+        let escaped = write.kind == WriteKind::Escaped;
         if !symbol.assigned {
-            symbol.unknown_reason = if handed_over { Reason::HandedOver } else { Reason::Assigned };
-        } else if !handed_over {
+            symbol.unknown_reason = if escaped { Reason::Escaped } else { Reason::Assigned };
+        } else if !escaped {
             symbol.unknown_reason = Reason::Assigned;
         }
         symbol.assigned = true;
@@ -98,7 +98,7 @@ impl Symbols {
     }
 
     /// SetDataVal with a computed name may write any data, SetAllDataVal any data of its type.
-    fn record_writes_by_name(&mut self, all: &[UnitFacts]) {
+    fn record_writes_by_name(&mut self, all: &[BodyFacts]) {
         let by_name: Vec<&Option<Vec<u8>>> = all.iter().flat_map(|facts| &facts.writes_by_name).collect();
         if by_name.is_empty() {
             return;
@@ -124,37 +124,37 @@ impl Symbols {
             written.resize(written.len() + routine.head.parameters.len(), None);
         }
         let mut passed: Vec<Edge<()>> = Vec::new();
-        for unit in &self.units {
-            let Some(routine) = unit.routine else { continue };
+        for body in &self.bodies {
+            let Some(routine) = body.routine else { continue };
             let parameters = &self.routines[routine as usize].head.parameters;
             if !parameters.iter().any(|parameter| parameter.by_reference) {
                 continue;
             }
             let own = |symbol: u32| {
                 let symbol = &self.symbols[symbol as usize];
-                let is_own = symbol.kind == SymbolKind::Parameter && symbol.scope == unit.scope;
+                let is_own = symbol.kind == SymbolKind::Parameter && symbol.scope == body.scope;
                 let mut all = parameters.iter();
                 let at = all.position(|p| is_own && p.name == symbol.name && p.by_reference)?;
                 Some(firsts[routine as usize] + at)
             };
-            let tree = &trees[unit.file as usize];
-            for node in unit.node + 1..tree.nodes.subtree_end(unit.node) {
+            let tree = &trees[body.file as usize];
+            for node in body.node + 1..tree.nodes.subtree_end(body.node) {
                 let found = tree.nodes.get(node);
                 if !found.kind.may_change() {
                     continue;
                 }
-                self.for_each_write(tree, unit.scope, node, &mut |write| {
-                    let handed_over = write.kind == WriteKind::HandedOver;
-                    let reason = if handed_over { Reason::HandedOver } else { Reason::Assigned };
+                self.for_each_write(tree, body.scope, node, &mut |write| {
+                    let escaped = write.kind == WriteKind::Escaped;
+                    let reason = if escaped { Reason::Escaped } else { Reason::Assigned };
                     if let Some(at) = own(write.symbol) {
                         written[at].join(&Some(reason));
                     }
                 });
                 let is_call = matches!(found.kind, Syntax::Call | Syntax::Function);
-                if is_call && !self.is_plain_motion(tree, unit.scope, node) {
-                    let callees = self.callees(unit.scope, tree.text(found.first));
+                if is_call && !self.is_plain_motion(tree, body.scope, node) {
+                    let callees = self.callees(body.scope, tree.text(found.first));
                     self.for_each_passed(tree, node, callees, &mut |callee, index, argument| {
-                        let data = argument.value.and_then(|value| self.root(tree, unit.scope, value));
+                        let data = argument.value.and_then(|value| self.root(tree, body.scope, value));
                         let from = firsts[callee as usize] + index;
                         passed.extend(data.and_then(own).map(|at| (from as u32, at as u32, ())));
                     });
@@ -170,13 +170,13 @@ impl Symbols {
     }
 
     /// Fixpoint: the side-effect summary of each routine.
-    fn solve_side_effects(&mut self, all: &[UnitFacts]) {
-        let own = |(facts, unit): (&UnitFacts, &Unit)| {
-            let outside = |symbol: u32| self.symbols[symbol as usize].scope != unit.scope;
+    fn solve_side_effects(&mut self, all: &[BodyFacts]) {
+        let own = |(facts, body): (&BodyFacts, &Body)| {
+            let outside = |symbol: u32| self.symbols[symbol as usize].scope != body.scope;
             let writes: Vec<u32> =
                 facts.writes.iter().map(|write| write.symbol).filter(|&s| outside(s)).collect();
             // A parameter by reference is data of the caller.
-            let writes_parameter = unit.routine.is_some_and(|routine| {
+            let writes_parameter = body.routine.is_some_and(|routine| {
                 self.routines[routine as usize].parameter_writes.iter().any(Option::is_some)
             });
             let mut effects = SideEffects { writes, ..facts.effects };
@@ -184,18 +184,18 @@ impl Symbols {
             effects.normalise();
             effects
         };
-        let mut effects: Vec<SideEffects> = all.iter().zip(&self.units).map(own).collect();
-        // After the units a node for each list of routines that a computed name may call; what else such a call may do is a fact
+        let mut effects: Vec<SideEffects> = all.iter().zip(&self.bodies).map(own).collect();
+        // After the bodies a node for each list of routines that a computed name may call; what else such a call may do is a fact
         // of its caller.
         let lists = all.len() as u32;
         effects.resize(all.len() + self.late_lists.len(), SideEffects::default());
         let mut edges: Vec<Edge<bool>> = Vec::new();
         for ((caller, facts), list) in (0..).zip(all).zip(&self.late_list) {
-            edges.extend(facts.calls.iter().map(|&callee| (self.unit_of(callee), caller, false)));
+            edges.extend(facts.calls.iter().map(|&callee| (self.body_of(callee), caller, false)));
             edges.push((lists + list, caller, false));
         }
         for (list, callees) in (lists..).zip(&self.late_lists) {
-            edges.extend(callees.iter().map(|&callee| (self.unit_of(callee), list, true)));
+            edges.extend(callees.iter().map(|&callee| (self.body_of(callee), list, true)));
         }
         edges.sort_unstable();
         edges.dedup();
@@ -204,15 +204,15 @@ impl Symbols {
             false => callee.clone(),
         });
         self.late_switches = effects.split_off(all.len()).iter().map(|effects| effects.switches).collect();
-        for (unit, effects) in self.units.iter().zip(effects) {
-            if let Some(routine) = unit.routine {
+        for (body, effects) in self.bodies.iter().zip(effects) {
+            if let Some(routine) = body.routine {
                 self.routines[routine as usize].effects = effects;
             }
         }
     }
 
     /// Marks volatile data: written by an interrupt routine, an error handler that resumes, or the controller.
-    fn solve_volatile_data(&mut self, trees: &[RapidTree<'_>], all: &[UnitFacts]) {
+    fn solve_volatile_data(&mut self, trees: &[RapidTree<'_>], all: &[BodyFacts]) {
         let later = all.iter().flat_map(|facts| &facts.writes).filter(|w| w.kind == WriteKind::Later);
         let mut writes: Vec<u32> = later.map(|write| write.symbol).collect();
         let mut writes_anything = false;
@@ -220,16 +220,16 @@ impl Symbols {
             writes.extend_from_slice(&effects.writes);
             writes_anything |= effects.writes_anything;
         };
-        for unit in &self.units {
-            let Some(routine) = unit.routine else { continue };
+        for body in &self.bodies {
+            let Some(routine) = body.routine else { continue };
             if self.interrupts[routine as usize] {
                 add(self.effects_of(routine));
                 continue;
             }
-            let tree = &trees[unit.file as usize];
-            for clause in tree.child_nodes(unit.node).filter(|&clause| is_resuming_handler(tree, clause)) {
+            let tree = &trees[body.file as usize];
+            for clause in tree.child_nodes(body.node).filter(|&clause| is_resuming_handler(tree, clause)) {
                 let end = tree.nodes.subtree_end(clause);
-                let facts = self.facts_of(trees, *unit, clause + 1..end);
+                let facts = self.facts_of(trees, *body, clause + 1..end);
                 let writes = facts.writes.iter().map(|write| write.symbol).collect();
                 add(&SideEffects { writes, ..facts.effects });
                 for callee in facts.calls {

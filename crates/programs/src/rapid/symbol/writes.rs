@@ -4,7 +4,7 @@
 use super::Symbols;
 use super::effects::{Write, WriteKind};
 use crate::motion::Reason;
-use crate::rapid::instruction::{self, Also, INSTRUCTIONS, Instruction, Slot};
+use crate::rapid::instruction::{self, INSTRUCTIONS, Instruction, SideEffect, Slot};
 use crate::rapid::predefined::{self, Effect};
 use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, parts, token_kind};
 use crate::rapid::token::{Token, folded, same_name};
@@ -41,10 +41,7 @@ impl Symbols {
             }
             Syntax::LateCall => {
                 for argument in arguments(tree, node) {
-                    add(
-                        argument.value.and_then(|value| self.root(tree, scope, value)),
-                        WriteKind::HandedOver,
-                    );
+                    add(argument.value.and_then(|value| self.root(tree, scope, value)), WriteKind::Escaped);
                 }
             }
             _ => {}
@@ -70,7 +67,7 @@ impl Symbols {
             [routine as usize]
             .parameter_writes[index]
         {
-            Some(Reason::HandedOver) => add(root(argument), WriteKind::HandedOver),
+            Some(Reason::Escaped) => add(root(argument), WriteKind::Escaped),
             Some(_) => add(root(argument), WriteKind::Whole),
             None => {}
         });
@@ -113,7 +110,7 @@ impl Symbols {
                 }
             }
             // Unknown code may write its arguments.
-            None => arguments(tree, node).for_each(|argument| add(root(&argument), WriteKind::HandedOver)),
+            None => arguments(tree, node).for_each(|argument| add(root(&argument), WriteKind::Escaped)),
         }
     }
 
@@ -164,7 +161,7 @@ fn outputs_of_instruction(
     }
     for argument in arguments(tree, node).filter(|argument| argument.optional) {
         let returned = |name: u32| tree.text(name).get(..3).is_some_and(|n| same_name(n, b"Ret"));
-        if known.also == Also::Returns && argument.name.is_some_and(returned) {
+        if known.side_effect == SideEffect::Returns && argument.name.is_some_and(returned) {
             add(&argument);
         }
     }

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::super::evaluate::target::Source;
+use super::super::evaluate::target::ValueOrigin;
 use super::super::evaluate::{Context, Evaluator, Known};
 use super::super::instruction::{self, INSTRUCTIONS};
 use super::super::symbol::Symbols;
@@ -13,12 +13,12 @@ use crate::motion::{MotionTarget, Origin, Role};
 use crate::tree::Child;
 
 /// Nodes that one thread processes at a time.
-const PORTION: u32 = 1 << 14;
+const CHUNK: u32 = 1 << 14;
 
 /// About as many nodes as a motion with its target written out has, or fewer.
 pub(super) const NODES_PER_MOTION: usize = 14;
 
-/// The targets, by file and portion of the call, in the order of nodes.
+/// The targets, by file and chunk of the call, in the order of nodes.
 pub(super) struct Literals {
     read: Vec<Vec<Vec<Read>>>,
 }
@@ -34,13 +34,13 @@ impl Literals {
     /// Reads the literals in motion instructions.
     pub(super) fn of(trees: &[RapidTree<'_>], symbols: &Symbols) -> Self {
         let files = trees.par_iter().enumerate().map(|(file, tree)| {
-            let portions = 0..tree.nodes.len().div_ceil(PORTION);
-            portions.into_par_iter().map(|portion| read(trees, symbols, file as u32, portion)).collect()
+            let chunks = 0..tree.nodes.len().div_ceil(CHUNK);
+            chunks.into_par_iter().map(|chunk| read(trees, symbols, file as u32, chunk)).collect()
         });
         Literals { read: files.collect() }
     }
 
-    /// The target of the literal at `node` in the call at `call`; `None` where it was not read. `last`: where in its portion the
+    /// The target of the literal at `node` in the call at `call`; `None` where it was not read. `last`: where in its chunk the
     /// last one was found: the next one usually follows it.
     pub(super) fn target(
         &self,
@@ -50,21 +50,20 @@ impl Literals {
         joints: bool,
         last: &mut usize,
     ) -> Option<MotionTarget> {
-        let portion = self.read.get(file as usize)?.get((call / PORTION) as usize)?;
-        let next =
-            [*last + 1, 0].into_iter().find(|at| portion.get(*at).is_some_and(|read| read.node == node));
-        let at = next.or_else(|| portion.binary_search_by_key(&node, |read| read.node).ok())?;
+        let chunk = self.read.get(file as usize)?.get((call / CHUNK) as usize)?;
+        let next = [*last + 1, 0].into_iter().find(|at| chunk.get(*at).is_some_and(|read| read.node == node));
+        let at = next.or_else(|| chunk.binary_search_by_key(&node, |read| read.node).ok())?;
         *last = at;
-        Some(&portion[at]).filter(|read| read.joints == joints).map(|read| read.target)
+        Some(&chunk[at]).filter(|read| read.joints == joints).map(|read| read.target)
     }
 }
 
-fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> Vec<Read> {
+fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, chunk: u32) -> Vec<Read> {
     let tree = &trees[file as usize];
     let evaluator = Evaluator::new(trees, symbols);
-    let first = portion * PORTION;
-    let end = (first + PORTION).min(tree.nodes.len());
-    let mut out = Vec::with_capacity(PORTION as usize / NODES_PER_MOTION);
+    let first = chunk * CHUNK;
+    let end = (first + CHUNK).min(tree.nodes.len());
+    let mut out = Vec::with_capacity(CHUNK as usize / NODES_PER_MOTION);
     for call in first..end {
         let found = tree.nodes.get(call);
         if found.kind != Syntax::Call {
@@ -87,8 +86,8 @@ pub(super) fn target(evaluator: &Evaluator<'_, '_>, file: u32, node: u32, joints
     // It contains no name: any scope serves.
     let (value, source) = evaluator.target(Context::new(file, 0, &nothing), Child::Node(node), joints);
     let origin = match source {
-        Source::Inline => Origin::Inline,
-        Source::Computed => Origin::Computed,
+        ValueOrigin::Inline => Origin::Inline,
+        ValueOrigin::Computed => Origin::Computed,
         _ => Origin::Unknown,
     };
     let argument = evaluator.trees[file as usize].node_span(node);

@@ -9,11 +9,11 @@ use crate::motion::{
     Role, Routine,
 };
 use crate::rapid::evaluate::Context;
-use crate::rapid::evaluate::target::Source;
+use crate::rapid::evaluate::target::ValueOrigin;
 use crate::rapid::flow::AbstractState;
 use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
 use crate::rapid::predefined;
-use crate::rapid::symbol::{SymbolKind, Unit};
+use crate::rapid::symbol::{Body, SymbolKind};
 use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
 use crate::rapid::token::{Token, display, folded, same_name};
 use crate::tree::Child;
@@ -23,8 +23,8 @@ impl ListingBuilder<'_, '_> {
         self.names[known].get_or_insert_with(|| INSTRUCTIONS[known].name.into()).clone()
     }
 
-    fn routine_of(&mut self, unit: Unit) -> Option<u32> {
-        let routine = unit.routine?;
+    fn routine_of(&mut self, body: Body) -> Option<u32> {
+        let routine = body.routine?;
         if let Some(index) = self.routines[routine as usize] {
             return Some(index);
         }
@@ -40,45 +40,45 @@ impl ListingBuilder<'_, '_> {
         Some(index)
     }
 
-    fn motion(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Motion {
-        let tree = &self.trees[unit.file as usize];
-        let (place, statement) = (self.place(unit.file, tree.nodes.first(node)), tree.node_span(node));
+    fn motion(&mut self, body: Body, node: u32, state: &AbstractState, nesting: Nesting) -> Motion {
+        let tree = &self.trees[body.file as usize];
+        let (place, statement) = (self.place(body.file, tree.nodes.first(node)), tree.node_span(node));
         Motion {
             accepts_configuration: true,
             in_loop: nesting.in_loop,
             conditional: nesting.conditional,
             previous: state.previous,
-            routine: self.routine_of(unit),
+            routine: self.routine_of(body),
             ..Motion::new(place, statement, Arc::default(), MotionKind::Unknown, Modal::START)
         }
     }
 
     fn target(
         &mut self,
-        unit: Unit,
+        body: Body,
         state: &AbstractState,
         argument: Child,
         joints: bool,
         role: Role,
     ) -> MotionTarget {
-        let tree = &self.trees[unit.file as usize];
-        let context = Context::new(unit.file, unit.scope, &state.known);
+        let tree = &self.trees[body.file as usize];
+        let context = Context::new(body.file, body.scope, &state.known);
         let (value, source) = self.evaluator.target(context, argument, joints);
         self.impure |= self.evaluator.may_raise()
-            || self.symbols.is_impure(tree, unit.scope, argument)
-            || matches!(source, Source::Symbol(symbol) | Source::Element(symbol, _) if self.has_impure_initial(symbol));
+            || self.symbols.is_impure(tree, body.scope, argument)
+            || matches!(source, ValueOrigin::Symbol(symbol) | ValueOrigin::Element(symbol, _) if self.has_impure_initial(symbol));
         let (first, end) = tokens_of(tree, argument);
         let origin = match source {
-            Source::Inline => Origin::Inline,
-            Source::Computed => Origin::Computed,
-            Source::Unknown => Origin::Unknown,
-            Source::Offset(base, offset) => {
+            ValueOrigin::Inline => Origin::Inline,
+            ValueOrigin::Computed => Origin::Computed,
+            ValueOrigin::Unknown => Origin::Unknown,
+            ValueOrigin::Offset(base, offset) => {
                 let (first, end) = tokens_of(tree, base);
                 self.listing.offsets.push(PersistentOffset { base: tree.span(first, end), offset });
                 Origin::Offset(self.listing.offsets.len() as u32 - 1)
             }
-            Source::Symbol(symbol) => Origin::Declared(self.declaration(symbol)),
-            Source::Element(symbol, literal) => {
+            ValueOrigin::Symbol(symbol) => Origin::Declared(self.declaration(symbol)),
+            ValueOrigin::Element(symbol, literal) => {
                 Origin::Element { declaration: self.declaration(symbol), literal }
             }
         };
@@ -89,19 +89,19 @@ impl ListingBuilder<'_, '_> {
     fn add_target(
         &mut self,
         motion: &mut Motion,
-        (unit, call, state): (Unit, u32, &AbstractState),
+        (body, call, state): (Body, u32, &AbstractState),
         argument: Child,
         joints: bool,
         (role, before): (Role, u32),
     ) {
-        match literals::plain(&self.trees[unit.file as usize], argument) {
+        match literals::plain(&self.trees[body.file as usize], argument) {
             Some(node) => {
                 let motion = self.listing.motions.len() as u32;
-                let file = unit.file;
+                let file = body.file;
                 self.literals.push(Literal { motion, target: before, role, file, call, node, joints });
             }
             None => {
-                motion.targets.push(self.target(unit, state, argument, joints, role));
+                motion.targets.push(self.target(body, state, argument, joints, role));
             }
         }
     }
@@ -148,15 +148,15 @@ impl ListingBuilder<'_, '_> {
     /// A motion instruction of the table.
     pub(super) fn table_motion(
         &mut self,
-        unit: Unit,
+        body: Body,
         node: u32,
         state: &AbstractState,
         nesting: Nesting,
         known: usize,
     ) -> Motion {
-        let tree = &self.trees[unit.file as usize];
+        let tree = &self.trees[body.file as usize];
         let instruction: &Instruction = &INSTRUCTIONS[known];
-        let mut motion = self.motion(unit, node, state, nesting);
+        let mut motion = self.motion(body, node, state, nesting);
         self.impure = false;
         motion.instruction = self.name_of(known);
         motion.kind = instruction.kind;
@@ -186,41 +186,41 @@ impl ListingBuilder<'_, '_> {
             match slot {
                 Some(Slot::To) => {
                     let joints = instruction.takes_joints();
-                    self.add_target(&mut motion, (unit, node, state), value, joints, (Role::To, targets));
+                    self.add_target(&mut motion, (body, node, state), value, joints, (Role::To, targets));
                     (targets, to) = (targets + 1, Some(value));
                 }
                 Some(Slot::Via) => {
-                    self.add_target(&mut motion, (unit, node, state), value, false, (Role::Via, targets));
+                    self.add_target(&mut motion, (body, node, state), value, false, (Role::Via, targets));
                     (targets, via) = (targets + 1, true);
                 }
-                Some(Slot::Speed) => motion.speed = Some(self.speed(unit, state, value)),
-                Some(Slot::Zone) => motion.zone = Some(self.zone(unit, state, value)),
+                Some(Slot::Speed) => motion.speed = Some(self.speed(body, state, value)),
+                Some(Slot::Zone) => motion.zone = Some(self.zone(body, state, value)),
                 Some(Slot::Tool) => {
                     tool = Some(value);
-                    motion.tool = Some(self.tool(unit, state, value));
+                    motion.tool = Some(self.tool(body, state, value));
                 }
                 _ => {}
             }
         }
         motion.timed = options.timed;
         if let (Some(speed), Some(velocity)) = (motion.speed, velocity) {
-            motion.speed = Some(self.overridden(speed, unit, state, velocity));
+            motion.speed = Some(self.overridden(speed, body, state, velocity));
         }
         if let Some(time) = time {
-            let duration_s = self.evaluated(unit, state, time).number();
+            let duration_s = self.evaluated(body, state, time).number();
             self.listing.durations_s.insert(self.listing.motions.len() as u32, duration_s);
         }
         let free =
-            !options.timed && !options.whole && !nesting.guarded && !self.has_impure_argument(unit, node);
+            !options.timed && !options.whole && !nesting.guarded && !self.has_impure_argument(body, node);
         motion.insertable = free && instruction.splits();
         motion.can_straighten = free
             && instruction.kind == MotionKind::Circular
             && instruction.line_form().is_some_and(Instruction::splits);
         if tool.is_some() {
-            motion.work_object = Some(self.work_object(unit, state, work_object));
+            motion.work_object = Some(self.work_object(body, state, work_object));
         }
         if motion.to().is_some_and(|to| to.value.is_err())
-            && self.follows_position(unit, to, tool, work_object)
+            && self.follows_position(body, to, tool, work_object)
         {
             let to = motion.targets.iter_mut().rev().find(|target| target.role == Role::To);
             to.into_iter().for_each(|to| to.value = Err(Reason::CurrentPosition));
@@ -263,13 +263,13 @@ impl ListingBuilder<'_, '_> {
     }
 
     /// Whether an argument calls a function of the program or an impure one: each inserted target would evaluate it again.
-    fn has_impure_argument(&self, unit: Unit, node: u32) -> bool {
-        let tree = &self.trees[unit.file as usize];
+    fn has_impure_argument(&self, body: Body, node: u32) -> bool {
+        let tree = &self.trees[body.file as usize];
         let nodes = node..tree.nodes.subtree_end(node);
         let mut functions = nodes.filter(|&node| tree.nodes.kind(node) == Syntax::Function);
         functions.any(|function| {
             let name = tree.text(tree.nodes.first(function));
-            self.symbols.routine(unit.scope, name).is_some() || !predefined::is_pure(name)
+            self.symbols.routine(body.scope, name).is_some() || !predefined::is_pure(name)
         })
     }
 
@@ -277,16 +277,16 @@ impl ListingBuilder<'_, '_> {
     /// with `Offs` or `RelTool`.
     fn follows_position(
         &self,
-        unit: Unit,
+        body: Body,
         to: Option<Child>,
         tool: Option<Child>,
         work_object: Option<Child>,
     ) -> bool {
-        let tree = &self.trees[unit.file as usize];
+        let tree = &self.trees[body.file as usize];
         let function = |value: Option<Child>| match value {
             Some(Child::Node(node)) if tree.nodes.kind(node) == Syntax::Function => {
                 let name = tree.text(tree.nodes.first(node));
-                self.symbols.find(unit.scope, name).is_none().then_some((node, name))
+                self.symbols.find(body.scope, name).is_none().then_some((node, name))
             }
             _ => None,
         };
@@ -313,18 +313,18 @@ impl ListingBuilder<'_, '_> {
     /// A call that takes a target but is no motion instruction of the table.
     pub(super) fn other_motion(
         &mut self,
-        unit: Unit,
+        body: Body,
         node: u32,
         state: &AbstractState,
         nesting: Nesting,
     ) -> Option<Motion> {
-        let tree = &self.trees[unit.file as usize];
+        let tree = &self.trees[body.file as usize];
         let late = tree.nodes.kind(node) == Syntax::LateCall;
         let name = match parts(tree, node).nth(1).filter(|_| late) {
             Some(expression) => text_of(tree, expression),
             None => tree.text(tree.nodes.first(node)),
         };
-        let routine = if late { None } else { self.symbols.routine(unit.scope, name) };
+        let routine = if late { None } else { self.symbols.routine(body.scope, name) };
         let mut found: Vec<(Child, bool)> = Vec::new();
         if let Some(routine) = routine {
             let routine = &self.symbols.routines[routine as usize];
@@ -351,14 +351,14 @@ impl ListingBuilder<'_, '_> {
                 }
             }
         } else if let Some(moves) = predefined::displaces(name).filter(|_| !late) {
-            let mut motion = self.motion(unit, node, state, nesting);
+            let mut motion = self.motion(body, node, state, nesting);
             motion.instruction = display(name).into();
             motion.own_reason = Some(moves?);
             return Some(motion);
         } else if predefined::effect(name).is_none() || late {
             for argument in arguments(tree, node) {
                 let Some(value) = argument.value else { continue };
-                if let Some(joints) = self.looks_like_target(unit, value) {
+                if let Some(joints) = self.looks_like_target(body, value) {
                     found.push((value, joints));
                 }
             }
@@ -366,10 +366,10 @@ impl ListingBuilder<'_, '_> {
         if found.is_empty() {
             return None;
         }
-        let mut motion = self.motion(unit, node, state, nesting);
+        let mut motion = self.motion(body, node, state, nesting);
         motion.instruction = display(name).into();
         for (value, joints) in found {
-            let mut target = self.target(unit, state, value, joints, Role::To);
+            let mut target = self.target(body, state, value, joints, Role::To);
             // Never rewritten here: no declaration counts it as a use by a motion.
             if let Origin::Declared(_) | Origin::Element { .. } = target.origin {
                 target.origin = Origin::Computed;
@@ -385,28 +385,28 @@ impl ListingBuilder<'_, '_> {
     }
 
     /// Lists a call without targets if no file declares what it calls.
-    pub(super) fn record_outside_call(&mut self, unit: Unit, node: u32) {
-        let tree = &self.trees[unit.file as usize];
+    pub(super) fn record_outside_call(&mut self, body: Body, node: u32) {
+        let tree = &self.trees[body.file as usize];
         let name = tree.text(tree.nodes.first(node));
         let is_outside = tree.nodes.kind(node) != Syntax::LateCall && predefined::effect(name).is_none();
-        if is_outside && self.symbols.callees(unit.scope, name).is_empty() {
-            let place = self.place(unit.file, tree.nodes.first(node));
+        if is_outside && self.symbols.callees(body.scope, name).is_empty() {
+            let place = self.place(body.file, tree.nodes.first(node));
             self.listing.outside_calls.push(OutsideCall { name: display(name), place });
         }
     }
 
     /// Whether an argument is a target by its type: `Some(true)` for a jointtarget.
-    fn looks_like_target(&self, unit: Unit, value: Child) -> Option<bool> {
-        let tree = &self.trees[unit.file as usize];
+    fn looks_like_target(&self, body: Body, value: Child) -> Option<bool> {
+        let tree = &self.trees[body.file as usize];
         if let Child::Node(node) = value {
             let mut inside = expressions(tree, node);
             match tree.nodes.kind(node) {
-                Syntax::Paren => return self.looks_like_target(unit, inside.next()?),
+                Syntax::Paren => return self.looks_like_target(body, inside.next()?),
                 Syntax::Aggregate => {
                     let parts: Vec<Child> = inside.collect();
                     let fits = |types: &[(&[u8], usize)]| {
                         parts.len() == types.len()
-                            && parts.iter().zip(types).all(|(&part, of)| self.fits(unit, part, *of))
+                            && parts.iter().zip(types).all(|(&part, of)| self.fits(body, part, *of))
                     };
                     let joints = fits(&[(b"robjoint", 6), (b"extjoint", 6)]);
                     let pose = fits(&[(b"pos", 3), (b"orient", 4), (b"confdata", 4), (b"extjoint", 6)]);
@@ -415,7 +415,7 @@ impl ListingBuilder<'_, '_> {
                 _ => {}
             }
         }
-        match &*self.evaluator.type_of((unit.file, unit.scope), value)? {
+        match &*self.evaluator.type_of((body.file, body.scope), value)? {
             b"robtarget" => Some(false),
             b"jointtarget" => Some(true),
             _ => None,
@@ -423,13 +423,13 @@ impl ListingBuilder<'_, '_> {
     }
 
     /// Whether a value may be of a type with this number of components.
-    fn fits(&self, unit: Unit, value: Child, (type_name, count): (&[u8], usize)) -> bool {
-        let tree = &self.trees[unit.file as usize];
+    fn fits(&self, body: Body, value: Child, (type_name, count): (&[u8], usize)) -> bool {
+        let tree = &self.trees[body.file as usize];
         match value {
             Child::Node(node) if tree.nodes.kind(node) == Syntax::Aggregate => {
                 expressions(tree, node).count() == count
             }
-            _ => self.evaluator.type_of((unit.file, unit.scope), value).is_some_and(|t| t == type_name),
+            _ => self.evaluator.type_of((body.file, body.scope), value).is_some_and(|t| t == type_name),
         }
     }
 }

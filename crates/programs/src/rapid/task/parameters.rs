@@ -12,38 +12,38 @@ use crate::rapid::token::{Token, folded, same_name};
 use crate::tree::Child;
 
 /// For each parameter, by symbol, the data that every call hands over.
-pub(super) type HandedOver = HashMap<u32, u32>;
+pub(super) type PassedData = HashMap<u32, u32>;
 
 /// What the calls of a routine hand over for one parameter, each symbol once; `None` where one of them is no name or there are many.
 type Arguments = Option<Vec<u32>>;
 
 /// Most symbols that the calls of a routine hand over; parameters of its callers among them.
-const MOST: usize = 4;
+const MAX_SYMBOLS: usize = 4;
 
 /// Most routines through which one argument is handed on.
 const DEPTH: usize = 6;
 
-pub(super) fn of(trees: &[RapidTree<'_>], symbols: &Symbols, mains: &[u32]) -> HandedOver {
+pub(super) fn of(trees: &[RapidTree<'_>], symbols: &Symbols, mains: &[u32]) -> PassedData {
     if trees.iter().any(|tree| !tree.opaque.is_empty()) {
-        return HandedOver::new();
+        return PassedData::new();
     }
     let parameters = frame_parameters(trees, symbols, mains);
     if parameters.iter().all(Vec::is_empty) {
-        return HandedOver::new();
+        return PassedData::new();
     }
     let mut found: HashMap<u32, Arguments> = HashMap::new();
-    for unit in &symbols.units {
-        let tree = &trees[unit.file as usize];
-        let nodes = unit.node..tree.nodes.subtree_end(unit.node);
+    for body in &symbols.bodies {
+        let tree = &trees[body.file as usize];
+        let nodes = body.node..tree.nodes.subtree_end(body.node);
         for call in nodes.filter(|node| tree.nodes.kind(*node) == Syntax::Call) {
-            let callees = symbols.callees(unit.scope, tree.text(tree.nodes.first(call)));
+            let callees = symbols.callees(body.scope, tree.text(tree.nodes.first(call)));
             for (callee, is_alone) in callees.iter().map(|callee| (*callee, callees.len() == 1)) {
                 for &(position, parameter) in &parameters[callee as usize] {
-                    let data = argument(tree, symbols, unit.scope, (call, callee, position), trees);
+                    let data = argument(tree, symbols, body.scope, (call, callee, position), trees);
                     let all = found.entry(parameter).or_insert_with(|| Some(Vec::new()));
                     match (data.filter(|_| is_alone), &mut *all) {
                         (Some(data), Some(known)) if known.contains(&data) => {}
-                        (Some(data), Some(known)) if known.len() < MOST => known.push(data),
+                        (Some(data), Some(known)) if known.len() < MAX_SYMBOLS => known.push(data),
                         _ => *all = None,
                     }
                 }

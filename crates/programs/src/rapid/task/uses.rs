@@ -2,7 +2,7 @@
 
 use super::ListingBuilder;
 use crate::motion::{MotionKind, Origin, OtherUse};
-use crate::rapid::symbol::{SymbolKind, Unit};
+use crate::rapid::symbol::{Body, SymbolKind};
 use crate::rapid::syntax::{RapidTree, Syntax, arguments, token_kind, tokens_of};
 use crate::rapid::token::{Token, fold, same_name};
 
@@ -31,13 +31,13 @@ impl<'s> ListingBuilder<'_, 's> {
             likely[hash(self.trees[symbol.file as usize].text(symbol.name))] = true;
         }
         // A use at the first byte of a target argument is the motion's own; any other within it is part of an expression.
-        for (unit_index, unit) in self.symbols.units.iter().enumerate() {
-            let tree = &self.trees[unit.file as usize];
-            // Motions are listed unit by unit.
-            let first = self.units.partition_point(|&unit| unit < unit_index as u32) as u32;
-            let end = self.units.partition_point(|&unit| unit <= unit_index as u32) as u32;
+        for (body_index, body) in self.symbols.bodies.iter().enumerate() {
+            let tree = &self.trees[body.file as usize];
+            // Motions are listed body by body.
+            let first = self.bodies.partition_point(|&body| body < body_index as u32) as u32;
+            let end = self.bodies.partition_point(|&body| body <= body_index as u32) as u32;
             let motions: Vec<u32> = (first..end).collect();
-            self.uses_in(*unit, tree, &motions, &likely, &hash);
+            self.uses_in(*body, tree, &motions, &likely, &hash);
         }
         self.uses_in_declarations(&likely, &hash);
         self.uses_by_name();
@@ -67,13 +67,13 @@ impl<'s> ListingBuilder<'_, 's> {
 
     pub(super) fn uses_in(
         &mut self,
-        unit: Unit,
+        body: Body,
         tree: &RapidTree<'s>,
         motions: &[u32],
         likely: &[bool],
         hash: &dyn Fn(&[u8]) -> usize,
     ) {
-        let node = tree.nodes.get(unit.node);
+        let node = tree.nodes.get(body.node);
         let mut next = 0;
         for token in node.first..node.end {
             // A string may be the name that GetDataVal reads.
@@ -85,10 +85,10 @@ impl<'s> ListingBuilder<'_, 's> {
             if !likely[hash(name)] {
                 continue;
             }
-            let Some(symbol) = self.symbols.find(unit.scope, name) else { continue };
+            let Some(symbol) = self.symbols.find(body.scope, name) else { continue };
             let Some(&declaration) = self.declarations.get(&symbol) else { continue };
             let found = &self.symbols.symbols[symbol as usize];
-            if found.file == unit.file && found.name == token {
+            if found.file == body.file && found.name == token {
                 continue;
             }
             let start = tree.start(token) as u32;
@@ -124,7 +124,7 @@ impl<'s> ListingBuilder<'_, 's> {
                             _ => false,
                         }
                 });
-                let place = self.place(unit.file, token);
+                let place = self.place(body.file, token);
                 let uses = &mut self.listing.declarations[declaration as usize].other_uses;
                 uses.push(OtherUse { motion: computed, place });
             }

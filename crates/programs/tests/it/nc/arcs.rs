@@ -6,7 +6,7 @@ use truegrind_programs::nc::Task;
 use truegrind_programs::nc::arc::{Arc, Plane};
 use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, Heidenhain, LinuxCnc, Siemens};
 use truegrind_programs::nc::setup::Setup;
-use truegrind_programs::rewrite::{Change, Outcome};
+use truegrind_programs::rewrite::{Change, RewriteOutcome};
 
 use super::default_deny::{HEAD, begin, check, left};
 use super::{change_of, rewrite_as};
@@ -25,7 +25,7 @@ fn nearly_alike(listing: &Listing, step: [f64; 2]) -> Vec<Change> {
 }
 
 /// The lines after the first motion, and the outcomes of all requested changes.
-fn run(dialect: Dialect, body: &str, step: [f64; 2]) -> (Vec<String>, Vec<Outcome>) {
+fn run(dialect: Dialect, body: &str, step: [f64; 2]) -> (Vec<String>, Vec<RewriteOutcome>) {
     let source = format!("{HEAD}{}{body}\n", begin(dialect));
     let (text, rewritten) = rewrite_as(&source, dialect, |listing| nearly_alike(listing, step));
     let skip = source.lines().count() - body.lines().count();
@@ -41,18 +41,18 @@ fn number(line: &str, letter: char) -> f64 {
 
 #[test]
 fn an_arc_with_a_pinned_start_does_not_change_its_radius() {
-    let refused = [Outcome::Refused(Reason::BeforeUnmodifiedArc), Outcome::Refused(WrongShape)];
+    let refused = [RewriteOutcome::Refused(Reason::BeforeUnmodifiedArc), RewriteOutcome::Refused(WrongShape)];
     // The quarter starts at the end of an unmodified arc: only its end would move.
     let (text, outcomes) =
         run(Heidenhain, "CC X+6 Y+2\nC X+1 Y+2 DR+\nCR X+0 Y+3 R+1 DR+\nL X+0 Y+9", [0.0; 2]);
     assert_eq!(text[..3], ["CC X+6 Y+2", "C X+1 Y+2 DR+", "CR X+0 Y+3 R+1 DR+"]);
-    assert_eq!(outcomes[0], Outcome::Refused(WrongShape));
-    assert_eq!(outcomes[1], Outcome::InPlace);
+    assert_eq!(outcomes[0], RewriteOutcome::Refused(WrongShape));
+    assert_eq!(outcomes[1], RewriteOutcome::InPlace);
     // The same after a helical full turn, which no circle closes.
     let (text, outcomes) = run(LinuxCnc, "G3 X1 Y2 Z2 I5 J0\nG3 X0 Y3 I-1 J0\nG1 X0 Y9", [1e-2, 0.0]);
     assert_eq!(text[..2], ["G3 X1 Y2 Z2 I5 J0", "G3 X0 Y3 I-1 J0"]);
     assert_eq!(outcomes[..2], refused);
-    assert_eq!(outcomes[2], Outcome::Refused(WrongShape));
+    assert_eq!(outcomes[2], RewriteOutcome::Refused(WrongShape));
     let (text, _) = run(Siemens, "G2 I5 J0 TURN=1\nG2 X3 Y4 I2 J0\nG1 X0 Y9", [0.0; 2]);
     assert_eq!(text[..2], ["G2 I5 J0 TURN=1", "G2 X3 Y4 I2 J0"]);
 }
@@ -68,7 +68,7 @@ fn an_almost_closed_arc_keeps_its_centre() {
     ] {
         for step in [[0.0, 0.0], [3e-5, -4e-5], [-2e-4, 1e-4]] {
             let (text, outcomes) = run(LinuxCnc, line, step);
-            if outcomes[1] != Outcome::InPlace {
+            if outcomes[1] != RewriteOutcome::InPlace {
                 // After such a small gap the arc may reverse its direction: then it is refused.
                 assert_eq!(text[0], line);
                 continue;
@@ -82,11 +82,11 @@ fn an_almost_closed_arc_keeps_its_centre() {
     // Not because it was refused.
     assert_eq!(
         run(LinuxCnc, "G3 X0.9994 Y2.0004 I3 J4", [3e-5, -4e-5]).1,
-        [Outcome::InPlace, Outcome::InPlace]
+        [RewriteOutcome::InPlace, RewriteOutcome::InPlace]
     );
     assert_eq!(
         run(LinuxCnc, "G3 X1.004 Y1.997 I4.065 J7.955", [-2e-4, 1e-4]).1,
-        [Outcome::InPlace, Outcome::InPlace]
+        [RewriteOutcome::InPlace, RewriteOutcome::InPlace]
     );
 }
 
@@ -96,7 +96,7 @@ fn a_full_circle_stays_full_when_its_end_is_rounded() {
         [("G3 X1.001 Y2 I50 J0", 0.0), ("G3 X1.001 Y2 I5 J0", 3e-4), ("G2 X1.001 Y2 I5 J0", -3e-4)]
     {
         let (text, outcomes) = run(LinuxCnc, line, [step, 0.0]);
-        assert_eq!(outcomes, [Outcome::InPlace, Outcome::InPlace], "{line}");
+        assert_eq!(outcomes, [RewriteOutcome::InPlace, RewriteOutcome::InPlace], "{line}");
         assert_eq!(number(&text[0], 'X'), 1.0 + BY[0], "{}", text[0]);
         assert!((number(&text[0], 'I') - number(line, 'I')).abs() < 2e-3, "{}", text[0]);
     }
@@ -111,7 +111,7 @@ fn a_short_arc_keeps_its_radius_and_its_path() {
     {
         for step in [[0.0, 0.0], [3e-5, -4e-5], [-4e-5, 5e-5]] {
             let (text, outcomes) = run(LinuxCnc, line, step);
-            assert_eq!(outcomes, [Outcome::InPlace, Outcome::InPlace], "{line} {chord}");
+            assert_eq!(outcomes, [RewriteOutcome::InPlace, RewriteOutcome::InPlace], "{line} {chord}");
             if line.contains('R') {
                 let (now, was) = (number(&text[0], 'R'), number(line, 'R'));
                 assert!((now / was - 1.0).abs() < 0.05, "{line} -> {}", text[0]);
@@ -134,8 +134,8 @@ fn a_refused_motion_keeps_every_word() {
         });
         let arc = body.lines().nth(1).unwrap();
         assert!(text.lines().any(|line| line == arc), "{text}");
-        assert_eq!(rewritten.outcomes[1], Outcome::Refused(BeforeUnmodifiedArc));
-        assert_eq!(rewritten.outcomes[2], Outcome::InPlace);
+        assert_eq!(rewritten.outcomes[1], RewriteOutcome::Refused(BeforeUnmodifiedArc));
+        assert_eq!(rewritten.outcomes[2], RewriteOutcome::InPlace);
     }
 }
 

@@ -5,7 +5,7 @@ use truegrind_programs::motion::Reason::{self, *};
 use truegrind_programs::nc::Task;
 use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, Heidenhain, Iso, LinuxCnc, Siemens};
 use truegrind_programs::nc::setup::Setup;
-use truegrind_programs::rewrite::{Outcome, RewriteOptions};
+use truegrind_programs::rewrite::{RewriteOptions, RewriteOutcome};
 
 use super::{change_of, ends, moved, rewrite_as};
 
@@ -373,7 +373,7 @@ fn unmodified_motions_keep_their_end_points() {
     });
     assert_eq!(
         rewritten.outcomes[..2],
-        [Outcome::Refused(BeforeUnmodifiedArc), Outcome::Refused(WrongShape)]
+        [RewriteOutcome::Refused(BeforeUnmodifiedArc), RewriteOutcome::Refused(WrongShape)]
     );
     assert_eq!(text, source.replace("G1 X5\n", "G1 X5.5000\n"));
     // Without TRAORI a tool vector is not a word.
@@ -510,7 +510,10 @@ fn a_word_that_may_be_an_increment_depends_on_its_start() {
     );
     let (_, rewritten) = rewrite_as(&source, Siemens, |listing| vec![change_of(listing, 1, [0.5, 0.4, 0.3])]);
     let stays = |reason| matches!(reason, BeforeUnmodifiedPath | BeforeIncrement);
-    assert!(matches!(rewritten.outcomes[0], Outcome::Refused(reason) if stays(reason)), "{rewritten:?}");
+    assert!(
+        matches!(rewritten.outcomes[0], RewriteOutcome::Refused(reason) if stays(reason)),
+        "{rewritten:?}"
+    );
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use truegrind_programs::motion::Reason;
 use truegrind_programs::nc::dialect::Dialect::{Fanuc, LinuxCnc, Siemens};
-use truegrind_programs::rewrite::Outcome;
+use truegrind_programs::rewrite::RewriteOutcome;
 
 use super::default_deny::{HEAD, begin};
 use super::{change_of, rewrite_as};
@@ -25,9 +25,10 @@ fn a_motion_whose_line_would_become_too_long_is_refused() {
             let (text, rewritten) =
                 rewrite_as(&source, dialect, |listing| (1..3).map(|m| change_of(listing, m, by)).collect());
             let stays = !fits && dialect != Fanuc;
-            let expected = if stays { Outcome::Refused(Reason::LineTooLong) } else { Outcome::InPlace };
+            let expected =
+                if stays { RewriteOutcome::Refused(Reason::LineTooLong) } else { RewriteOutcome::InPlace };
             assert_eq!(rewritten.outcomes[0], expected, "{dialect:?} {text}");
-            assert_eq!(rewritten.outcomes[1], Outcome::InPlace, "{dialect:?}");
+            assert_eq!(rewritten.outcomes[1], RewriteOutcome::InPlace, "{dialect:?}");
             assert_eq!(text.contains(&full), stays, "{dialect:?} {text}");
             assert!(dialect == Fanuc || text.lines().all(|line| line.len() < most), "{dialect:?} {text}");
         }
@@ -36,8 +37,11 @@ fn a_motion_whose_line_would_become_too_long_is_refused() {
         let source = format!("{HEAD}{}X5. Y6. Z7.\n{full}\n", begin(dialect));
         let (text, rewritten) =
             rewrite_as(&source, dialect, |listing| vec![change_of(listing, 1, [1.2345, 2.3456, 3.4567])]);
-        let expected =
-            if dialect == Fanuc { Outcome::InPlace } else { Outcome::Refused(Reason::LineTooLong) };
+        let expected = if dialect == Fanuc {
+            RewriteOutcome::InPlace
+        } else {
+            RewriteOutcome::Refused(Reason::LineTooLong)
+        };
         assert_eq!(rewritten.outcomes[0], expected, "{dialect:?} {text}");
     }
 }

@@ -4,13 +4,13 @@
 
 use truegrind_programs::motion::Reason;
 use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, LinuxCnc, Siemens};
-use truegrind_programs::rewrite::Outcome;
+use truegrind_programs::rewrite::RewriteOutcome;
 
 use super::default_deny::{HEAD, begin};
 use super::{moved, rewrite_as};
 
 /// The outcome of the first motion, if everything that can be changed is.
-fn first(dialect: Dialect, body: &str) -> Outcome {
+fn first(dialect: Dialect, body: &str) -> RewriteOutcome {
     let source = format!("{HEAD}{}{body}\n", begin(dialect));
     let (_, rewritten) = rewrite_as(&source, dialect, |listing| moved(listing, [1.5, -1.25, 0.75]));
     rewritten.outcomes[0].clone()
@@ -18,7 +18,7 @@ fn first(dialect: Dialect, body: &str) -> Outcome {
 
 #[test]
 fn an_origin_used_by_unmodified_words_pins_the_motion_that_ends_there() {
-    let refused = Outcome::Refused(Reason::BeforeOrigin);
+    let refused = RewriteOutcome::Refused(Reason::BeforeOrigin);
     for body in [
         "G92 X0. Y0. Z0.\n#103=0\nWHILE [#103 LT 2] DO1\nG1 X20. Y-30. A175.\n#103=#103+1\nEND1",
         "G92 X0. Y0. Z0.\nN10 G1 X20.\nIF [#1 EQ 0] GOTO 10",
@@ -39,7 +39,7 @@ fn an_origin_used_by_unmodified_words_pins_the_motion_that_ends_there() {
 
 #[test]
 fn unmodified_increments_and_position_reads_pin_the_motion_that_ends_there() {
-    let refused = Outcome::Refused(Reason::BeforeIncrement);
+    let refused = RewriteOutcome::Refused(Reason::BeforeIncrement);
     for body in [
         "#103=0\nWHILE [#103 LT 2] DO1\nG91 G1 X20.\n#103=#103+1\nEND1",
         "#1=#5041\nG1 X#1",
@@ -63,11 +63,11 @@ fn a_line_behind_a_canned_cycle_keeps_the_level_at_which_the_cycle_began() {
         (Fanuc, "G98 G81 X5. Y5. Z-3. R2. F200.\nG3 X10. Y-10. R12.", Reason::BeforeIncrement),
         (LinuxCnc, "G98 G81 X5 Y5 Z-3 R2 F200\nG80\nG1 X20 Y0", Reason::BeforeOmitted),
     ] {
-        assert_eq!(first(dialect, body), Outcome::Refused(reason), "{body}");
+        assert_eq!(first(dialect, body), RewriteOutcome::Refused(reason), "{body}");
     }
     // The line states where it ends, and how the tool is turned.
     let stated = "G81 X5. Y5. Z-3. R2. F200.\nG80\nG1 X20. Y0. Z5. A180. B0. C0.";
-    assert_eq!(first(Fanuc, stated), Outcome::InPlace);
+    assert_eq!(first(Fanuc, stated), RewriteOutcome::InPlace);
 }
 
 /// A left block that only turns the tool ends where the motion before does, in whatever way orientations are stated.
@@ -78,7 +78,7 @@ fn a_block_that_only_turns_takes_over_the_position() {
         (Siemens, "IF (R3)<=0 GOTOF M_1\nG70\nM_1:\nTHETA=5"),
         (Siemens, "IF (R3)<=0 GOTOF M_1\nG70\nM_1:\nA3=0 B3=0 C3=1"),
     ] {
-        assert_eq!(first(dialect, body), Outcome::Refused(Reason::BeforeOmitted), "{body}");
+        assert_eq!(first(dialect, body), RewriteOutcome::Refused(Reason::BeforeOmitted), "{body}");
     }
 }
 
@@ -92,7 +92,7 @@ fn restated_or_independent_words_pin_nothing() {
         "G91 G1 X5.",
         "G54",
     ] {
-        assert_eq!(first(Fanuc, body), Outcome::InPlace, "{body}");
+        assert_eq!(first(Fanuc, body), RewriteOutcome::InPlace, "{body}");
     }
 }
 
@@ -111,12 +111,12 @@ fn no_block_is_inserted_before_one_that_changes_word_semantics() {
 /// increment from there is right on one path only: nothing is corrected there.
 #[test]
 fn an_increment_after_a_skippable_block_pins_the_motion_before() {
-    let refused = Outcome::Refused(Reason::BeforeIncrement);
+    let refused = RewriteOutcome::Refused(Reason::BeforeIncrement);
     for body in ["/Y-10\nX=IC(5) Y-7", "/A=175\nX4 A=IC(5)", "/Z7\nG91 X5 Y1 Z1", "/Y-10\nG91 Z4"] {
         assert_eq!(first(Siemens, body), refused, "{body}");
     }
     assert_eq!(first(Fanuc, "/Y-10.\nG91 X5."), refused);
     assert_eq!(first(LinuxCnc, "/Y-10\nG91 X5"), refused);
     // An absolute value does not depend on the position.
-    assert_eq!(first(Siemens, "/Y-10\nX5 Y-7"), Outcome::InPlace);
+    assert_eq!(first(Siemens, "/Y-10\nX5 Y-7"), RewriteOutcome::InPlace);
 }

@@ -5,7 +5,7 @@ use truegrind_programs::motion::Reason::*;
 use truegrind_programs::nc::Task;
 use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, Heidenhain, LinuxCnc, Siemens};
 use truegrind_programs::nc::setup::Setup;
-use truegrind_programs::rewrite::Outcome;
+use truegrind_programs::rewrite::RewriteOutcome;
 
 use super::default_deny::{HEAD, begin, check, left};
 use super::{moved, rewrite_as};
@@ -212,7 +212,7 @@ proptest! {
         let changes = moved(&before.listing, by);
         let taken = |index: usize| {
             changes.iter().zip(&rewritten.outcomes).any(|(change, outcome)| {
-                change.motion as usize == index && !matches!(outcome, Outcome::Refused(_))
+                change.motion as usize == index && !matches!(outcome, RewriteOutcome::Refused(_))
             })
         };
         let end = |task: &Task<'_>, index: usize| {

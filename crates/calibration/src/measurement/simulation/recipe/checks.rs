@@ -8,9 +8,9 @@ use truegrind_arm::bounds::{
 use truegrind_arm::effect::bounds::effects;
 
 /// Most rows of a simulated file.
-const MOST_ROWS: usize = 1_000_000;
+const MAX_ROWS: usize = 1_000_000;
 /// Most faults, and most rows that lists of faults name.
-const MOST_FAULTS: usize = 10_000;
+const MAX_FAULTS: usize = 10_000;
 
 const LENGTH_SIGMA_MM: Bound = Bound::new(0.0, 200.0, "a standard deviation in mm, 0 to 200");
 const ANGLE_SIGMA_DEG: Bound = Bound::new(0.0, 45.0, "a standard deviation in degrees, 0 to 45");
@@ -121,7 +121,7 @@ impl Recipe {
         let sides = if self.conditions.approach == super::Approach::Both { 2 } else { 1 };
         let rows = [repeats.max(1), sides, self.sensor.anchors()];
         let rows = rows.iter().try_fold(poses.unwrap_or(usize::MAX), |all, times| all.checked_mul(*times));
-        if rows.is_some_and(|rows| rows <= MOST_ROWS) && poses.is_some_and(|poses| poses <= MOST_ROWS) {
+        if rows.is_some_and(|rows| rows <= MAX_ROWS) && poses.is_some_and(|poses| poses <= MAX_ROWS) {
             return Ok(());
         }
         let found = rows.map_or_else(|| "more rows than can be counted".to_owned(), |n| format!("{n} rows"));
@@ -190,7 +190,7 @@ fn faults(list: &[Fault]) -> Result<(), InvalidValue> {
             named = named.saturating_add(row_list.len());
         }
     }
-    if named <= MOST_FAULTS {
+    if named <= MAX_FAULTS {
         return Ok(());
     }
     Err(InvalidValue::new("fault", format!("{named} faults and rows in lists"), "at most 10,000"))
