@@ -401,14 +401,9 @@ fn without_measurement_causes(
     let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
     let beside = in_doubt::with_zero_causes(&without, certain.fit.clone());
     match probability_worse(&certain.fit, &beside, &median_condition(dataset), &samples) {
-<<<<<<< HEAD
-        Some(probability) if probability > sensor_causes::MOST_PROBABILITY => {
+        Some(probability) if probability > sensor_causes::MAX_PROBABILITY => {
             let written = WrittenFit { errors: search.validation.stage(&without), fit: without };
             (written, Some(LeftOut { fit: certain.fit, probability }))
-=======
-        Some(probability) if probability > sensor_causes::MAX_PROBABILITY => {
-            (WrittenFit { errors: search.validation.stage(&without), fit: without }, Some(probability))
->>>>>>> repW
         }
         _ => (certain, None),
     }

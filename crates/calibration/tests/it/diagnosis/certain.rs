@@ -564,6 +564,42 @@ fn what_the_written_arm_lacks_of_the_arm_is_in_its_error_beside_a_droop() {
     assert!(left_out > 0, "the droop must be left out of a fit");
 }
 
+/// A sag of the cable that the written arm is fitted without pulls its links to wrong places: they were stated as if there were none.
+#[test]
+fn what_a_left_out_cause_of_the_measurement_does_to_the_links_is_in_their_uncertainty() {
+    let arm = arm();
+    let (outlet, hook) = (Vector3::new(900.0, -700.0, 200.0), Vector3::new(0.0, 0.0, 40.0));
+    let mut left_out = 0;
+    for seed in 1..=6 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let rows: Vec<Row> = (0..160)
+            .map(|number| {
+                let q = Joints::from_fn(|_, _| rng.random_range(-1.2..1.2));
+                let at = arm.forward(&q, &Condition::default()) * nalgebra::Point3::from(hook);
+                let away = at.coords - outlet;
+                // The parabola of a taut cable: (w/T)² h² d / 24, lengths in metres.
+                let longer_mm = 0.05_f64.powi(2) * away.xy().norm_squared() * away.norm() * 1e-6 / 24.0;
+                Row::new(number, q, Reading::Cable(away.norm() + longer_mm + 0.05 * normal(&mut rng)))
+            })
+            .collect();
+        let dataset = Dataset::new("sag.csv", Sensor::Cable, rows);
+        let mut options = Options::default();
+        options.tolerance.scale = Some(2e-4);
+        options.arm_tolerance.scale = Some(2e-4);
+        let found = diagnose(&dataset, "arm", &arm, &frames(&dataset, &arm), &options, &|_| {}).unwrap();
+        let notes = &found.diagnosis.notes;
+        left_out += usize::from(
+            notes.iter().any(|note| note.contains("fitted without the causes in the measurement")),
+        );
+        let links = found.estimated.parameters.iter().filter(|parameter| parameter.is_of_link());
+        let squares: Vec<f64> = links.map(|p| ((p.value - p.nominal) / p.sigma).powi(2)).collect();
+        let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        eprintln!("seed {seed}: {rms} {notes:?}");
+        assert!(rms < 1.5, "seed {seed}: links are {rms:.2} σ off");
+    }
+    assert!(left_out > 0, "the sag must be left out of a fit");
+}
+
 /// What is stated of the sensor's frame and of the target shows where the arm stands: a written arm without causes, which is the one that
 /// `identify` fits, knows it as well as that.
 #[test]
