@@ -102,7 +102,7 @@ impl Recipe {
     /// let found = identify(&rows, "abb-irb-120", nominal, &frames, &share, &options)?.estimated;
     /// let fitted = found.model.links[2].theta_rad - nominal.links[2].theta_rad;
     /// assert!((fitted - turned).to_degrees().abs() < 0.02, "{}°", fitted.to_degrees());
-    /// assert!(found.geometry.held_out.rmse < 0.5 * found.registered.held_out.rmse);
+    /// assert!(found.calibrated.held_out.rmse < 0.5 * found.registered.held_out.rmse);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn simulate(
