@@ -52,6 +52,8 @@ pub(super) struct Handover<'a> {
     pub(super) repeats: Option<NoiseFloor>,
     /// Says that there are too few poses.
     pub(super) few_poses: Option<String>,
+    /// Says that the rows are those of two arms.
+    pub(super) mixed: Option<String>,
 }
 
 /// The arm for compensation.
@@ -202,6 +204,7 @@ impl Handover<'_> {
         let kept: Vec<usize> =
             (0..rows.rows.len()).filter(|row| !self.search.set_aside.contains(row)).collect();
         rows.subset(&kept)
+            mixed: self.mixed.as_deref(),
     }
 
     /// A fit with the stated uncertainty of the sensor's scale.
@@ -397,6 +400,8 @@ pub(super) fn too_many_aside(aside: usize, rows: usize) -> bool {
 /// The verdict of an identification, plus: a third of the rows must not be set aside, and findings must not raise the held-out error of geometry.
 fn judge(case: &Judged<'_>) -> Verdict {
     let mut verdict = VerdictBuilder::default();
+    /// That the rows are those of two arms.
+    mixed: Option<&'a str>,
     let stages = &case.stages;
     if case.fitted.termination().is_converged() {
         verdict.note(CONVERGED);
@@ -420,6 +425,9 @@ fn judge(case: &Judged<'_>) -> Verdict {
     verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
     verdict.check_benefit(case.benefit, case.sensor);
     if let Some(unseen_target) = &case.unseen_target {
+    if let Some(mixed) = case.mixed {
+        verdict.fail(mixed);
+    }
         verdict.note(unseen_target.as_str());
     }
     verdict.check_limits(&case.options.limits, &stages[2].random);
