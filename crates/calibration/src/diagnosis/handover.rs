@@ -85,6 +85,9 @@ struct WrittenArm<'a> {
 impl Handover<'_> {
     /// The arm with the causes that are `certain`, or with fewer of them, as the notes say.
     pub(super) fn arm(&self, certain: &[bool], notes: &mut Vec<String>) -> HandedOver {
+        if let Some(same) = self.identified_from_few_poses() {
+            return same;
+        }
         let (search, discrepancy) = (self.search, self.discrepancy);
         let certain = certain_model(search, certain, discrepancy);
         let beside_sensor = certain.errors;
@@ -107,6 +110,14 @@ impl Handover<'_> {
             beside_sensor,
         });
         self.or_geometry_alone(with_causes, beside_sensor, notes)
+    }
+
+    /// From too few poses to search causes in, the arm, benefit and verdict of `identify`, which fits the same rows. `None` where it refuses them.
+    fn identified_from_few_poses(&self) -> Option<HandedOver> {
+        self.few_poses.as_ref().filter(|_| self.search.extended.causes.is_empty())?;
+        let Identification { mut estimated, benefit, .. } = identified(self.search.context, self.robot)?;
+        estimated.provenance.method = "diagnose".to_owned();
+        Some(HandedOver { estimated, benefit })
     }
 
     /// The written arm with its benefit, or geometry alone (with a note) if only that is not refused.
@@ -193,6 +204,7 @@ impl Handover<'_> {
             unseen_target: unseen_target(handed, &self.kept_rows(), &estimated),
             stages: self.stages(arm.errors),
             set_aside: (self.search.set_aside.len(), rows.rows.len()),
+            mixed: self.mixed.as_deref(),
             options,
         });
         HandedOver { estimated, benefit: benefit.ok() }
@@ -204,7 +216,6 @@ impl Handover<'_> {
         let kept: Vec<usize> =
             (0..rows.rows.len()).filter(|row| !self.search.set_aside.contains(row)).collect();
         rows.subset(&kept)
-            mixed: self.mixed.as_deref(),
     }
 
     /// A fit with the stated uncertainty of the sensor's scale.
@@ -389,6 +400,8 @@ struct Judged<'a> {
     stages: [StageError; 3],
     /// How many rows were set aside, of how many.
     set_aside: (usize, usize),
+    /// That the rows are those of two arms.
+    mixed: Option<&'a str>,
     options: &'a Options,
 }
 
@@ -400,8 +413,6 @@ pub(super) fn too_many_aside(aside: usize, rows: usize) -> bool {
 /// The verdict of an identification, plus: a third of the rows must not be set aside, and findings must not raise the held-out error of geometry.
 fn judge(case: &Judged<'_>) -> Verdict {
     let mut verdict = VerdictBuilder::default();
-    /// That the rows are those of two arms.
-    mixed: Option<&'a str>,
     let stages = &case.stages;
     if case.fitted.termination().is_converged() {
         verdict.note(CONVERGED);
@@ -414,6 +425,9 @@ fn judge(case: &Judged<'_>) -> Verdict {
             stages[2].random.rmse, stages[1].random.rmse
         ));
     }
+    if let Some(mixed) = case.mixed {
+        verdict.fail(mixed);
+    }
     let (aside, rows) = case.set_aside;
     if too_many_aside(aside, rows) {
         verdict.fail(format!(
@@ -425,9 +439,6 @@ fn judge(case: &Judged<'_>) -> Verdict {
     verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
     verdict.check_benefit(case.benefit, case.sensor);
     if let Some(unseen_target) = &case.unseen_target {
-    if let Some(mixed) = case.mixed {
-        verdict.fail(mixed);
-    }
         verdict.note(unseen_target.as_str());
     }
     verdict.check_limits(&case.options.limits, &stages[2].random);
