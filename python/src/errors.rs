@@ -399,6 +399,9 @@ impl From<TrackError> for Refusal {
             TrackError::Foreign { file, left_mm, held_out_mm, .. } => {
                 told.of_file(&file).with(format!("{left_mm:.3} mm"), format!("about {held_out_mm:.3} mm"))
             }
+            TrackError::Station { file, rows, .. } => {
+                told.of_file(&file).with(format!("{rows} rows"), "at least 4 rows")
+            }
             TrackError::Sensor { file, found, expected } => told.of_file(&file).with(found, expected),
             TrackError::State { file, .. } => told.of_file(&file),
             TrackError::Placing(error) => Self { kind: Kind::Track, ..Self::from(error) },

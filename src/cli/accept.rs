@@ -29,13 +29,13 @@ pub(super) struct Arguments {
     /// Tolerance: the largest accepted position error (mm).
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     tolerance: f64,
-    /// Expanded uncertainty of the sensor, k = 2 (mm). Default: twice the scatter of repeated poses.
+    /// Expanded uncertainty of the sensor, k = 2 (mm). Default: from the scatter of repeated poses, for 95.45 %.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     sensor_uncertainty: Option<f64>,
     /// Tolerance of the orientation (°), for sensors that measure it. Without it orientation errors are reported but not judged.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tolerance_angle: Option<f64>,
-    /// Expanded uncertainty of the measured orientation, k = 2 (°). Default: twice the scatter of repeated poses.
+    /// Expanded uncertainty of the measured orientation, k = 2 (°). Default: from the scatter of repeated poses, for 95.45 %.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     sensor_uncertainty_angle: Option<f64>,
     /// Serial number or other remark for the report, such as --serial arm=120-503211. May be repeated.

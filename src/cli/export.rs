@@ -10,7 +10,8 @@ use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::transfer::{Models, transfer};
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::tolerance::Tolerance;
-use truegrind::robots::export::{Format, joint_matrix, lost_in_export, write};
+use truegrind::robots::Robot;
+use truegrind::robots::export::{Format, has_axes_of_ur, joint_matrix, lost_in_export, write};
 use truegrind::robots::foreign::{ImportOptions, import};
 
 use super::exit_status::ExitStatus;
@@ -68,6 +69,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         To::MdhCsv => Format::Modified,
         To::UrYaml => Format::UrYaml,
     };
+    if format == Format::UrYaml {
+        refuse_other_maker(arm, inputs::robot(stated.unwrap_or(arm.robot.as_str().into())).ok().as_ref())?;
+    }
     let bare = Model { effects: Vec::new(), ..arm.model.clone() };
     let mut notes = vec![format!("{} as estimated from {}", arm.robot, arm.provenance.file)];
     notes.extend(lost_in_export(&arm.model, format));
@@ -88,6 +92,21 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     }
     // Links without their effects are not the identified arm.
     Ok(if has_links_only(&arm.model) { ExitStatus::Done } else { ExitStatus::Flagged })
+}
+
+/// Refuses the kinematics file of UR drivers for an arm that they do not drive: of another maker, or with axes that lie otherwise.
+fn refuse_other_maker(arm: &Estimated, robot: Option<&Robot>) -> anyhow::Result<()> {
+    let maker = robot.map_or("", |robot| robot.sheet.maker.trim());
+    let is_other = !maker.is_empty() && !maker.to_lowercase().contains("universal");
+    if is_other || !has_axes_of_ur(&arm.nominal) {
+        let of =
+            if is_other { format!("made by {maker}") } else { "not an arm with the axes of a UR".to_owned() };
+        bail!(
+            "--to ur-yaml: {} is {of}, and only the drivers for arms of Universal Robots read this file: choose urdf, dh-csv or mdh-csv",
+            arm.robot
+        );
+    }
+    Ok(())
 }
 
 /// Whether the links alone describe the arm.

@@ -161,7 +161,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     };
     let frames = arguments.stated.planned(sensor)?;
     let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
-    let options = options(arguments, &robot.sheet.name, &setup)?;
+    let options =
+        Options { rated_load_kg: robot.sheet.payload_kg, ..options(arguments, &robot.sheet.name, &setup)? };
     let work = Spinner::start(format!("choosing among {} poses", arguments.candidates));
     let planned = on_threads(arguments.common.threads, || plan(&setup, &options))?
         .map_err(|e| anyhow!("{}: {e}", robot.sheet.name))?;

@@ -246,6 +246,16 @@ impl TrackContext<'_> {
                 Err(defect) => return Err(defect),
             }
             out.taking += begun.elapsed();
+            match tracker.waiting(dataset) {
+                0 => {}
+                rows => print_message_once(
+                    printed,
+                    format!(
+                        "note: {}: its last {rows} rows wait for more: a sensor that was set up anew (column station) is placed by four",
+                        dataset.file
+                    ),
+                ),
+            }
         }
         Ok(out)
     }

@@ -2,7 +2,7 @@
 //!
 //! Method. The sensor's frame is fitted to four fifths of the poses, and each pose is judged with a frame fitted without it
 //! (five folds); or the frame is stated and nothing is fitted. The decision follows ISO 14253-1 for an expanded uncertainty
-//! U (k = 2), the larger of what is stated and what repeated poses scatter: accepted if largest error plus U is within the
+//! U of 95.45 %, the larger of what is stated and what repeated poses scatter: accepted if largest error plus U is within the
 //! tolerance, refused if the largest error exceeds it by more than U, undecided otherwise. Where U is unknown, nothing is accepted; nor by
 //! poses that show too little of the arm ([`Tested`]). Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
 //! only if enough cycles were measured; path accuracy and repeatability (ten cycles) only from rows with a position on a
@@ -36,7 +36,7 @@ use crate::measurement::noise_floor::{noise_floor, noise_floor_rad};
 use crate::measurement::repeated_poses::poses;
 use crate::measurement::split::{Split, folds};
 
-pub use self::decision::{Decision, MIN_POSES, Uncertainty};
+pub use self::decision::{Decision, MIN_POSES, Scatter, Uncertainty};
 pub use self::error::AcceptError;
 pub use self::stations::Uncounted;
 pub use self::tested::{MIN_SHARE, Tested};
@@ -59,8 +59,8 @@ const MOVED_DEG: f64 = 10.0;
 pub struct Options {
     /// The largest error that is accepted (mm).
     pub tolerance_mm: f64,
-    /// Expanded uncertainty of the sensor, k = 2 (mm); twice the scatter of repeated poses, if there are any, where that is larger or
-    /// nothing is stated.
+    /// Expanded uncertainty of the sensor, k = 2 (mm); the scatter of repeated poses, if there are any, where that is larger or nothing is
+    /// stated.
     pub uncertainty_mm: Option<f64>,
     /// The largest accepted orientation error (rad); without it the orientation is reported and not judged.
     pub tolerance_rad: Option<f64>,
@@ -131,10 +131,12 @@ pub struct Acceptance {
     pub errors_mm: Vec<(usize, f64)>,
     /// Rows from small stations that show nothing of the arm.
     pub uncounted: Option<Uncounted>,
-    /// Expanded uncertainty, k = 2 (mm); 0 if unknown.
+    /// Expanded uncertainty of 95.45 % (mm); 0 if unknown.
     pub uncertainty_mm: f64,
     /// Source of the uncertainty.
     pub uncertainty: Uncertainty,
+    /// Scatter of repeated poses (mm), where any were repeated.
+    pub scatter: Option<Scatter>,
     /// The expanded uncertainty that was stated (mm).
     pub stated_mm: Option<f64>,
     /// Whether the sensor was registered with these poses, so that the placement of base and flange is not tested.
@@ -220,14 +222,17 @@ pub fn accept(
     let model = ErrorSummary::of(found.iter().copied());
     let groups = poses(dataset);
     let tested_poses = poses(&dataset.subset(&counted)).len();
-    let (uncertainty_mm, uncertainty) =
-        Uncertainty::of(options.uncertainty_mm, noise_floor(dataset).map(|floor| floor.sigma_mm));
+    let axes = dataset.sensor.axes();
+    let scatter =
+        noise_floor(dataset).map(|floor| Scatter { sigma: floor.sigma_mm, freedom: axes * floor.freedom });
+    let (uncertainty_mm, uncertainty) = Uncertainty::of(options.uncertainty_mm, scatter);
     let numbers = || counted.iter().map(|&row| dataset.rows[row].number);
     let numbered = |errors: Vec<f64>| numbers().zip(errors).collect();
     let orientation = (dataset.sensor == Sensor::Pose).then(|| {
         let model = ErrorSummary::of(found_rad.iter().copied());
-        let (uncertainty_rad, uncertainty) =
-            Uncertainty::of(options.uncertainty_rad, noise_floor_rad(dataset));
+        let scatter =
+            noise_floor_rad(dataset).map(|(sigma, freedom)| Scatter { sigma, freedom: 3 * freedom });
+        let (uncertainty_rad, uncertainty) = Uncertainty::of(options.uncertainty_rad, scatter);
         let decided =
             |tolerance| Decision::of(tested_poses, model.max, (uncertainty_rad, uncertainty), tolerance);
         Orientation {
@@ -235,6 +240,7 @@ pub fn accept(
             errors_rad: numbered(found_rad),
             uncertainty_rad,
             uncertainty,
+            scatter,
             tolerance_rad: options.tolerance_rad,
             decision: options.tolerance_rad.map_or(Decision::NotEvaluated, decided),
             model,
@@ -247,6 +253,7 @@ pub fn accept(
         errors_mm: numbered(found),
         uncertainty_mm,
         uncertainty,
+        scatter,
         stated_mm: options.uncertainty_mm,
         is_registered: options.frames.is_none(),
         tested: Tested::of(dataset, estimated, &frames(&observed, &estimated.model, options)?),

@@ -17,7 +17,7 @@ mod axis_range;
 mod copies;
 mod measuring_order;
 mod reach;
-mod row_list;
+pub(crate) mod row_list;
 pub mod sensor;
 pub mod registration;
 pub mod stations;

@@ -17,6 +17,8 @@
 //! Parameters that explain it nearly as well are reported as alternatives: a knocked sensor and a lost joint zero can look the
 //! same. Isolated outliers are ignored.
 //!
+//! **Set-ups.** Where the files state that the sensor was set up anew (column `station`), its frame is placed and fitted anew (`set_up`): no alarm.
+//!
 //! **Remounting and bursts.** Consecutive outliers are first tested for a remounted target or sensor (`mounting`): each pose
 //! gives the location of target and sensor, and if these agree on one far from the old one, a single alarm is raised and
 //! tracking continues there. Outliers without an explanation are a burst: one alarm until readings fit again.
@@ -63,7 +65,9 @@ mod mounting;
 mod noise;
 mod options;
 mod response;
+mod set_up;
 pub mod state;
+mod station;
 mod tracker;
 mod turn;
 

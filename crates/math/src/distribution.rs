@@ -95,6 +95,28 @@ pub fn student_two_sided(t: f64, freedom: f64) -> f64 {
     incomplete_beta(freedom / (freedom + t * t), 0.5 * freedom, 0.5)
 }
 
+/// The t of Student's distribution with `freedom` degrees of freedom beyond ±t of which lies the share `outside`.
+///
+/// ```
+/// use truegrind_math::distribution::student_quantile;
+///
+/// // Table G.2 of the GUM: 95.45 % lie within 13.97 standard deviations at one degree of freedom, 3.31 at three, 2.28 at ten.
+/// for (freedom, t) in [(1.0, 13.97), (3.0, 3.31), (10.0, 2.28), (1e7, 2.0)] {
+///     assert!((student_quantile(0.0455, freedom) - t).abs() < 6e-3);
+/// }
+/// ```
+pub fn student_quantile(outside: f64, freedom: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 2.0);
+    while student_two_sided(high, freedom) > outside && high < 1e9 {
+        high *= 2.0;
+    }
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if student_two_sided(middle, freedom) > outside { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
 /// I_x(a, b).
 fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x.is_nan() {

@@ -8,7 +8,7 @@
 //! - `roadmap`: paths around the obstacles;
 //! - [`schedule`]: repeats, both sides of approach, warm-up, and the order;
 //! - [`power`]: smallest detectable size of each effect;
-//! - [`questions`]: ambiguous findings of a diagnosis;
+//! - [`questions`]: ambiguous findings of a diagnosis; [`parting`]: how far rows part a finding and its rivals;
 //! - [`program`]: the measurement program.
 
 mod blank;
@@ -23,6 +23,7 @@ pub mod rows;
 pub mod design;
 pub mod field;
 pub mod schedule;
+pub mod parting;
 pub mod power;
 pub mod questions;
 pub mod program;
@@ -37,6 +38,7 @@ use self::candidate::{Candidate, RejectionCounts};
 use self::design::{Design, Index};
 use self::field::{FieldDesign, FieldUncertainty, TELLS};
 use self::keep_out::{CollisionChecker, KeepOut};
+use self::parting::Parting;
 use self::power::Detectability;
 use self::roadmap::Roadmap;
 use self::rows::ReadingJacobian;
@@ -67,6 +69,8 @@ pub struct Plan {
     pub rejections: RejectionCounts,
     /// Smallest detectable size of each effect.
     pub detectability: Vec<Detectability>,
+    /// How far the rows part each finding in question and its rivals.
+    pub partings: Vec<Parting>,
     /// Whether the poses are to determine geometry and effects, not only an error that no cause explains.
     pub geometry: bool,
     /// What is known of an error that no cause explains, where poses were chosen for it.
@@ -210,6 +214,11 @@ pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, Pla
     } else {
         Vec::new()
     };
+    let partings = options
+        .questions
+        .iter()
+        .filter_map(|question| parting::parting(setup, &parameters, &measured, question, options))
+        .collect();
     let space = options.bounds.space.clone();
     Ok(Plan {
         poses,
@@ -219,6 +228,7 @@ pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, Pla
         quality,
         rejections,
         detectability,
+        partings,
         field,
         clearance_mm: options.bounds.clearance_mm,
         space,

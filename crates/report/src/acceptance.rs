@@ -10,7 +10,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_calibration::acceptance::orientation::Orientation;
 use truegrind_calibration::acceptance::path::{PATH_CYCLES, PATH_POINTS, PathFound};
 use truegrind_calibration::acceptance::{
-    Acceptance, Decision, ISO_CYCLES, ISO_POSES, MIN_POSES, MIN_SHARE, Uncertainty, Uncounted,
+    Acceptance, Decision, ISO_CYCLES, ISO_POSES, MIN_POSES, MIN_SHARE, Scatter, Uncertainty, Uncounted,
 };
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind_math::statistics::ErrorSummary;
@@ -92,12 +92,9 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> PageVerdict {
             "the sensor uncertainty is unknown, so nothing can be accepted: state it (--sensor-uncertainty), or repeat some poses"
                 .to_owned(),
         ),
-        Uncertainty::Repeats => reasons.push(
-            "the uncertainty is twice the scatter of repeated poses; it does not contain systematic errors of the sensor"
-                .to_owned(),
-        ),
+        Uncertainty::Repeats => reasons.push(from_repeats("the uncertainty", found.scatter)),
         Uncertainty::AboveStated => reasons.push(format!(
-            "repeated poses scatter more than the stated uncertainty of {} mm allows: twice their scatter, {} mm, is used instead",
+            "repeated poses scatter more than the stated uncertainty of {} mm allows: that of their scatter, {} mm, is used instead",
             length(found.stated_mm.unwrap_or_default()),
             length(found.uncertainty_mm)
         )),
@@ -144,6 +141,39 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> PageVerdict {
         reasons.push("a cable measures errors only along itself; errors across it are not judged".to_owned());
     }
     PageVerdict::new(status, headline, reasons)
+}
+
+/// Degrees of freedom below which it is said how the uncertainty becomes smaller: the coverage factor is above 2.28.
+const FEW_FREEDOM: usize = 10;
+
+/// How the uncertainty follows from repeated poses.
+fn from_repeats(what: &str, scatter: Option<Scatter>) -> String {
+    let Some(scatter) = scatter else { return String::new() };
+    let more = if scatter.freedom < FEW_FREEDOM {
+        "; so few repeated readings leave it large: repeat ten poses, or state it"
+    } else {
+        ""
+    };
+    format!(
+        "{what} is {:.2} times the scatter of repeated poses (the factor of Student's t for 95.45 % at {} {}); it does not contain systematic \
+         errors of the sensor{more}",
+        scatter.coverage_factor(),
+        scatter.freedom,
+        degrees_of_freedom(scatter.freedom)
+    )
+}
+
+fn degrees_of_freedom(count: usize) -> &'static str {
+    if count == 1 { "degree of freedom" } else { "degrees of freedom" }
+}
+
+/// The coverage factor of an expanded uncertainty.
+fn coverage_factor((expanded, uncertainty): (f64, Uncertainty), scatter: Option<Scatter>) -> Option<f64> {
+    match uncertainty {
+        Uncertainty::Unknown => None,
+        Uncertainty::Stated => Some(2.0),
+        Uncertainty::Repeats | Uncertainty::AboveStated => scatter.map(|scatter| expanded / scatter.sigma),
+    }
 }
 
 /// Digits after the point that show a length (mm): three, or two significant ones where it is smaller.
@@ -279,17 +309,24 @@ fn orientation_reason(found: &Acceptance) -> Option<String> {
     match turns.uncertainty {
         Uncertainty::Stated => None,
         Uncertainty::AboveStated => Some(format!(
-            "repeated poses scatter more than the stated orientation uncertainty allows: twice their scatter, {:.4}°, is used instead",
+            "repeated poses scatter more than the stated orientation uncertainty allows: that of their scatter, {:.4}°, is used instead",
             turns.uncertainty_rad.to_degrees()
         )),
-        Uncertainty::Repeats => Some(
-            "the orientation uncertainty is twice the scatter of repeated poses; it does not contain systematic errors of the sensor"
-                .to_owned(),
-        ),
+        Uncertainty::Repeats => Some(from_repeats("the orientation uncertainty", turns.scatter)),
         Uncertainty::Unknown => Some(
             "the orientation uncertainty is unknown, so nothing can be accepted: state it (--sensor-uncertainty-angle), or repeat some poses"
                 .to_owned(),
         ),
+    }
+}
+
+/// What the uncertainty is expanded by.
+fn expanded(found: &Acceptance) -> String {
+    match (coverage_factor((found.uncertainty_mm, found.uncertainty), found.scatter), found.scatter) {
+        (Some(factor), Some(scatter)) if found.uncertainty != Uncertainty::Stated => {
+            format!("expanded, k = {factor:.2} ({} {})", scatter.freedom, degrees_of_freedom(scatter.freedom))
+        }
+        _ => "expanded, k = 2".to_owned(),
     }
 }
 
@@ -307,7 +344,7 @@ fn figures(found: &Acceptance) -> Vec<KeyFigure> {
         )),
         KeyFigure::new("Tolerance", found.tolerance_mm, digits(found.tolerance_mm), "mm"),
         KeyFigure::new("Uncertainty of the sensor", uncertainty, digits(found.uncertainty_mm), "mm")
-            .note("expanded, k = 2"),
+            .note(expanded(found)),
         KeyFigure::new("Poses", found.poses, 0, "").note("that the model was not fitted to"),
     ]
 }
@@ -623,6 +660,8 @@ pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, statem
             "tolerance_deg": turns.tolerance_rad.map(f64::to_degrees),
             "uncertainty": {
                 "expanded_deg": (turns.uncertainty != Uncertainty::Unknown).then_some(expanded), "from": known(turns.uncertainty),
+                "coverage_factor": coverage_factor((turns.uncertainty_rad, turns.uncertainty), turns.scatter),
+                "degrees_of_freedom": turns.scatter.map(|scatter| scatter.freedom),
             },
             "nominal": degrees(&turns.nominal),
             "model": degrees(&turns.model),
@@ -637,7 +676,11 @@ pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, statem
         "robot": estimated.robot,
         "decision": word(found.overall()),
         "tolerance_mm": found.tolerance_mm,
-        "uncertainty": { "expanded_mm": (found.uncertainty != Uncertainty::Unknown).then_some(found.uncertainty_mm), "from": uncertainty },
+        "uncertainty": {
+            "expanded_mm": (found.uncertainty != Uncertainty::Unknown).then_some(found.uncertainty_mm), "from": uncertainty,
+            "coverage_factor": coverage_factor((found.uncertainty_mm, found.uncertainty), found.scatter),
+            "degrees_of_freedom": found.scatter.map(|scatter| scatter.freedom),
+        },
         "poses": found.poses,
         "uncounted": found.uncounted.map(|left| json!({
             "rows": left.rows, "stations": left.stations, "of_stations": left.of_stations,

@@ -7,9 +7,12 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::measurement::dataset::Reading;
+use truegrind_math::sentence::listed;
 use truegrind_planning::poses::field::FieldUncertainty;
+use truegrind_planning::poses::parting::{DECIDES, Parting};
 use truegrind_planning::poses::power::Detectability;
 use truegrind_planning::poses::program::{checked, reading, unchecked};
+use truegrind_planning::poses::questions::CandidateCause;
 use truegrind_planning::poses::schedule::{FIRST_ROW, Purpose};
 use truegrind_planning::poses::{MeasurementSetup, Plan};
 
@@ -172,6 +175,7 @@ fn verdict(plan: &Plan, setup: &MeasurementSetup<'_>) -> PageVerdict {
         ));
         reasons.extend(tells_little(field, plan.poses.len()));
     }
+    reasons.extend(plan.partings.iter().map(|parting| parted(parting, plan)));
     let undecided: Vec<&Detectability> = plan.detectability.iter().filter(|d| !d.is_decided()).collect();
     if !undecided.is_empty() {
         let names: Vec<String> =
@@ -197,6 +201,92 @@ fn verdict(plan: &Plan, setup: &MeasurementSetup<'_>) -> PageVerdict {
         _ => (Status::Warning, "The program may run if the cable is unhooked between some poses"),
     };
     PageVerdict::new(status, headline, reasons)
+}
+
+/// Whether the rows will decide between a finding and its rivals, and what would.
+fn parted(parting: &Parting, plan: &Plan) -> String {
+    let [one, other] = parting.alike.each_ref().map(named);
+    let begin = format!(
+        "{} in question: these rows part the two causes that are most alike, {one} and {other}, with λ = {:.0}, where {DECIDES:.0} decide",
+        named(&parting.finding),
+        parting.lambda
+    );
+    let others = match parting.not_computed.as_slice() {
+        [] => String::new(),
+        kinds => {
+            let kinds: Vec<&str> = kinds.iter().map(|kind| kind.as_str()).collect();
+            format!(" (not computed: {})", kinds.join(", "))
+        }
+    };
+    if parting.decides() {
+        return format!("{begin}: they will probably decide{others}");
+    }
+    let mut remedies = Vec::new();
+    if let Some(load) = parting.with_load.filter(|load| load.lambda > MORE * parting.lambda) {
+        let enough = if load.lambda < DECIDES { ", which is not enough alone" } else { "" };
+        remedies.push(format!(
+            "a load of {} kg on the flange in every second row, logged in the column payload, would give λ = {:.0}{enough}",
+            load.kg, load.lambda
+        ));
+    }
+    let times = parting.times_as_many();
+    if times < MOST_TIMES {
+        let poses = (times * plan.poses.len() as f64).ceil();
+        remedies.push(format!("{times:.1} times as many poses would decide (--poses {poses:.0})"));
+    }
+    if parting.alone < DECIDES {
+        remedies
+            .push(format!("the effect itself shows with λ = {:.0} only: a less noisy sensor", parting.alone));
+    }
+    remedies.push("another place of the sensor or of the target may part them too".to_owned());
+    format!("{begin}: they will probably not decide{others}. What would: {}", remedies.join("; "))
+}
+
+/// Times the poses up to which more of them are a remedy.
+const MOST_TIMES: f64 = 4.0;
+
+/// Gain of λ from which a load is a remedy.
+const MORE: f64 = 1.5;
+
+/// A cause with its joints.
+fn named(cause: &CandidateCause) -> String {
+    let joints: Vec<String> = cause.joints.iter().map(|joint| (joint + 1).to_string()).collect();
+    match joints.as_slice() {
+        [] => cause.effect.as_str().to_owned(),
+        [one] => format!("{} of joint {one}", cause.effect),
+        several => format!("{} of joints {}", cause.effect, listed(several)),
+    }
+}
+
+/// How far the rows part each finding in question and its rivals.
+pub fn parting_table(plan: &Plan) -> Table {
+    let mut table = Table::of(
+        "Findings in question",
+        &plan.partings,
+        [
+            (Column::text("finding", "Finding"), |parting| named(&parting.finding).into()),
+            (Column::text("alike", "Most alike"), |parting| {
+                parting.alike.each_ref().map(named).join(" and ").into()
+            }),
+            (Column::significant("lambda", "λ", "", 2), |parting| parting.lambda.into()),
+            (Column::significant("lambda_alone", "λ without rivals", "", 2), |parting| parting.alone.into()),
+            (Column::significant("lambda_with_load", "λ with a load", "", 2), |parting| {
+                parting.with_load.map(|load| load.lambda).into()
+            }),
+            (Column::text("decides", "Will decide"), |parting| {
+                if parting.decides() {
+                    Cell::Judged(Status::Good, "probably".to_owned())
+                } else {
+                    Cell::Judged(Status::Warning, "probably not".to_owned())
+                }
+            }),
+        ],
+    );
+    table.notes.push(format!(
+        "λ: non-centrality with which these rows tell the two causes that are most alike from each other, at the size of the finding, geometry and \
+         frames free; from {DECIDES:.0} on they probably decide. With a load: the rated one, on the flange in every second row."
+    ));
+    table
 }
 
 /// Says that a target on the axis of joint 6 shows nothing of that joint.
@@ -233,10 +323,17 @@ fn tells_little(field: &FieldUncertainty, poses: usize) -> Option<String> {
 pub fn summary(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Document {
     let mut page = Document::new(format!("What to measure on {robot}"));
     page.push(verdict(plan, setup));
+    push_partings(&mut page, plan);
     if plan.geometry {
         page.push(effect_table(plan));
     }
     page
+}
+
+fn push_partings(page: &mut Document, plan: &Plan) {
+    if !plan.partings.is_empty() {
+        page.push(parting_table(plan));
+    }
 }
 
 /// The page.
@@ -245,6 +342,7 @@ pub fn document(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Docum
     page.push(verdict(plan, setup));
     page.push(key_figures(plan));
     page.paragraph("Obstacles in the cell are unknown to the planner: state them as boxes (--keep-out).");
+    push_partings(&mut page, plan);
     if plan.geometry {
         page.push(effect_table(plan));
     }
@@ -332,10 +430,28 @@ pub fn json(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Value {
             })
         })
         .collect();
+    let cause = |cause: &CandidateCause| json!({ "effect": cause.effect, "joints": cause.joints.iter().map(|joint| joint + 1).collect::<Vec<_>>() });
+    let partings: Vec<Value> = plan
+        .partings
+        .iter()
+        .map(|parting| {
+            json!({
+                "finding": cause(&parting.finding),
+                "alike": parting.alike.each_ref().map(cause),
+                "lambda": parting.lambda,
+                "lambda_alone": parting.alone,
+                "with_load": parting.with_load.map(|load| json!({ "kg": load.kg, "lambda": load.lambda })),
+                "needed": DECIDES,
+                "decides": parting.decides(),
+                "not_computed": parting.not_computed,
+            })
+        })
+        .collect();
     let sigma = |(parameter, sigma): (&Parameter, &f64)| json!({ "name": parameter.to_string(), "sigma": sigma, "unit": parameter.unit() });
     json!({
         "schema": "truegrind.plan/1",
         "robot": robot,
+        "findings_in_question": partings,
         "unexplained": plan.field.map(|field| json!({
             "before_mm": field.before_mm,
             "after_mm": field.after_mm,

@@ -294,6 +294,29 @@ fn a_mistake_that_explains_tracker_readings_is_named() {
     let mut swapped = owned.clone();
     swapped[0].swap(1, 2);
     refused(&written(&swapped), &["joints 2 and 3"]);
+    // A joint that counts the other way, or from another zero; two that do.
+    let changed = |joints: &[usize], change: &dyn Fn(f64) -> f64| {
+        let mut table = owned.clone();
+        for row in &mut table[1..] {
+            for joint in joints {
+                row[joint - 1] = change(row[joint - 1].parse().unwrap()).to_string();
+            }
+        }
+        written(&table)
+    };
+    refused(&changed(&[4], &|deg| -deg), &["if q4 gets the other sign", "truegrind robots"]);
+    refused(&changed(&[2], &|deg| deg + 90.0), &["if -90° are added to q2"]);
+    refused(&changed(&[1, 2], &|deg| -deg), &["if q1 and q2 get the other sign"]);
+    // Some rows in another unit.
+    let from = |row: usize, cells: std::ops::Range<usize>, factor: f64| {
+        let mut table = owned.clone();
+        for cell in table[row..].iter_mut().flat_map(|row| &mut row[cells.clone()]) {
+            *cell = (factor * cell.parse::<f64>().unwrap()).to_string();
+        }
+        written(&table)
+    };
+    refused(&from(150, 6..9, 1e-3), &["those of rows 150, 151", "are metres and the others millimetres"]);
+    refused(&from(150, 0..6, 1f64.to_radians()), &["of rows 150, 151", "radians and the others degrees"]);
     // A reading of row 82 is missing, and all later ones moved up.
     let mut short = owned.clone();
     for row in 81..short.len() - 1 {

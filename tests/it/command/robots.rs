@@ -185,7 +185,10 @@ fn what_is_exported_says_its_own_error() {
     let number = |text: &str, after: &str| -> f64 {
         text.split(after).nth(1).and_then(|rest| rest.split(' ').next()).unwrap().parse().unwrap()
     };
-    for form in ["urdf", "dh-csv", "mdh-csv", "ur-yaml"] {
+    let (code, _, err) = export("links.toml", &["ur-yaml", "-o", "arm.yaml"]);
+    assert!(code == 2 && err.contains("made by ABB") && err.contains("dh-csv"), "{err}");
+    assert!(!at.join("arm.yaml").exists());
+    for form in ["urdf", "dh-csv", "mdh-csv"] {
         let (code, out, err) = export("links.toml", &[form, "-o", "-", "--data", "later.csv"]);
         assert!(code == 0 && out.contains("to which the model was not fitted"), "{form}: {out}{err}");
         let (links, whole) = (number(&out, "sensor frame fitted: "), number(&out, "whole model "));

@@ -25,6 +25,18 @@ pub enum Format {
 /// The joints of a UR kinematics file.
 const UR: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
 
+/// Twists of the first five links of every arm of Universal Robots (°, without signs): axes 2 to 4 are parallel, the others stand across.
+const UR_TWISTS_DEG: [f64; 5] = [90.0, 0.0, 0.0, 90.0, 90.0];
+
+/// How far a twist of a data sheet may be from these (°).
+const SAME_TWIST_DEG: f64 = 5.0;
+
+/// Whether the axes of a nominal arm lie as those of an arm of Universal Robots.
+pub fn has_axes_of_ur(nominal: &Model) -> bool {
+    let twists = nominal.links.iter().map(|link| link.alpha_rad.to_degrees().abs());
+    twists.zip(UR_TWISTS_DEG).all(|(found, expected)| (found - expected).abs() < SAME_TWIST_DEG)
+}
+
 /// Parts of an arm that the format cannot represent, one sentence each.
 pub fn lost_in_export(model: &Model, format: Format) -> Vec<String> {
     let mut out = Vec::new();

@@ -1,5 +1,8 @@
 //! Decision rule for a largest error, its uncertainty and a tolerance (ISO 14253-1); the same for positions and orientations.
 
+use truegrind_math::distribution::student_quantile;
+use truegrind_math::tail::chi_square_tail;
+
 /// Fewest poses for a decision.
 pub const MIN_POSES: usize = 100;
 
@@ -16,14 +19,43 @@ pub enum Decision {
     NotEvaluated,
 }
 
+/// Scatter of repeated readings: of a length, or of a vector of three coordinates, which has three degrees of freedom for each of its
+/// repetitions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scatter {
+    /// Pooled standard deviation (mm or rad; of a vector the root of the sum over its coordinates).
+    pub sigma: f64,
+    /// Degrees of freedom of that.
+    pub freedom: usize,
+}
+
+/// Share of a normal distribution outside of two standard deviations, which k = 2 leaves out.
+const OUTSIDE: f64 = 0.045_500_264;
+
+/// Probability below which a stated standard deviation is refuted.
+const REFUTED: f64 = 0.05;
+
+impl Scatter {
+    /// The coverage factor of 95.45 %: that of Student's t, since the standard deviation is itself estimated from a few readings (GUM,
+    /// annex G); 2 for many.
+    pub fn coverage_factor(&self) -> f64 {
+        student_quantile(OUTSIDE, self.freedom.max(1) as f64)
+    }
+
+    /// Whether readings of this standard deviation would scatter as much in less than one of twenty cases.
+    fn refutes(&self, sigma: f64) -> bool {
+        chi_square_tail(self.freedom as f64 * (self.sigma / sigma).powi(2), self.freedom) < REFUTED
+    }
+}
+
 /// Source of the sensor's uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Uncertainty {
     /// Stated by the user.
     Stated,
-    /// Twice the scatter of repeated poses.
+    /// The scatter of repeated poses with its coverage factor ([`Scatter::coverage_factor`]).
     Repeats,
-    /// The same, and larger than what the user stated.
+    /// The same, or twice that scatter, and larger than what the user stated.
     AboveStated,
     /// Unknown: nothing can be accepted.
     Unknown,
@@ -57,12 +89,18 @@ impl Decision {
 }
 
 impl Uncertainty {
-    /// The expanded uncertainty (k = 2): as stated or from the standard deviation of repeated readings, whichever is larger; else 0.
-    pub(super) fn of(stated: Option<f64>, scatter: Option<f64>) -> (f64, Self) {
+    /// The expanded uncertainty of 95.45 %: as stated or from the standard deviation of repeated readings, whichever is larger; else 0.
+    ///
+    /// What was stated comes from many readings. A few that scatter more by chance raise it to twice their scatter; where they refute it, they
+    /// count as if nothing had been stated.
+    pub(super) fn of(stated: Option<f64>, scatter: Option<Scatter>) -> (f64, Self) {
         match (stated, scatter) {
-            (Some(expanded), Some(sigma)) if 2.0 * sigma > expanded => (2.0 * sigma, Self::AboveStated),
+            (Some(expanded), Some(scatter)) if 2.0 * scatter.sigma > expanded => {
+                let factor = if scatter.refutes(expanded / 2.0) { scatter.coverage_factor() } else { 2.0 };
+                (factor * scatter.sigma, Self::AboveStated)
+            }
             (Some(expanded), _) => (expanded, Self::Stated),
-            (None, Some(sigma)) => (2.0 * sigma, Self::Repeats),
+            (None, Some(scatter)) => (scatter.coverage_factor() * scatter.sigma, Self::Repeats),
             (None, None) => (0.0, Self::Unknown),
         }
     }

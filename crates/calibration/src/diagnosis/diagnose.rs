@@ -30,6 +30,7 @@ use crate::identification::fit::{
 };
 use crate::identification::misreading;
 use crate::identification::misreading::OTHER_ARM_MM;
+use crate::identification::mixed_rows::{MixedRows, mixed_rows};
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Dataset;
@@ -92,6 +93,8 @@ pub fn diagnose(
     progress("stability selection in halves of the rows");
     let mut confirmed = search.confirm();
     search.purge_validation(&mut confirmed);
+    let left_mm = ErrorSummary::of(search.full_fit.problem.errors_mm(&search.full_fit.x)).rmse;
+    let mixed = mixed_rows(&prepared.observed, nominal_arm, frames, &options.arm_tolerance, left_mm);
     let structure = residual_tests::structure(&subject, &search.full_fit, &search.set_aside);
     let smoothed = search.fit_smooth_correction(&structure);
     let summary = summary::summarise(&search, &confirmed, &structure, (smoothed, needed.is_some()));
@@ -127,6 +130,7 @@ pub fn diagnose(
         repeats,
         few_poses,
         identified: OnceCell::new(),
+        mixed: mixed.as_ref().map(MixedRows::sentence),
     };
     let WrittenModel { estimated, benefit } = handover.arm(&certain, &mut diagnosis.notes);
     diagnosis.verdict = Some(estimated.verdict.clone());

@@ -14,10 +14,11 @@ use super::validation::{ErrorsByStage, StageError};
 use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
+use crate::identification::calibration::Frames;
 use crate::identification::fit::Fitted;
 use crate::identification::identify::{
-    self, arm_covariance, arm_parameters_of, learned_width_uncertainty, median_condition,
-    with_sigma_in_region,
+    self, Identification, IdentifyError, arm_covariance, arm_parameters_of, fit_geometry,
+    learned_width_uncertainty, median_condition, with_sigma_in_region,
 };
 use crate::identification::inflation::inflation_from_errors;
 use crate::identification::linearised_readings::widen_by_scale;
@@ -26,12 +27,13 @@ use crate::identification::unseen_target::unseen_target;
 use crate::identification::verdict::VerdictBuilder;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::noise_floor::NoiseFloor;
-use crate::measurement::split;
+use crate::measurement::split::{self, Split};
 use nalgebra::{DMatrix, DVector};
 use std::cell::OnceCell;
 use truegrind_arm::estimated::{
     Estimated, EstimatedParameter, Judgement, Provenance, Reason, ReasonKind, StageErrors, Verdict,
 };
+use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Estimate;
@@ -56,8 +58,10 @@ pub(super) struct Handover<'a> {
     pub(super) repeats: Option<NoiseFloor>,
     /// Says that there are too few poses.
     pub(super) few_poses: Option<String>,
-    /// The geometry of [`identified`], once it was asked for.
+    /// The geometry of `identify`, once it was asked for.
     pub(super) identified: OnceCell<Option<Fitted>>,
+    /// Says that the rows are those of two arms.
+    pub(super) mixed: Option<String>,
 }
 
 /// The arm for compensation.
@@ -91,6 +95,9 @@ struct WrittenArm<'a> {
 impl Handover<'_> {
     /// The arm with the causes that are `certain`, or with fewer of them, as the notes say.
     pub(super) fn arm(&self, certain: &[bool], notes: &mut Vec<String>) -> WrittenModel {
+        if let Some(same) = self.identified_from_few_poses() {
+            return same;
+        }
         let (search, discrepancy) = (self.search, self.discrepancy);
         let certain = certain_model(search, certain, discrepancy);
         let beside_sensor = certain.errors;
@@ -114,6 +121,15 @@ impl Handover<'_> {
             with_sensor,
         });
         self.or_geometry_alone(with_causes, beside_sensor, with_sensor, notes)
+    }
+
+    /// From too few poses to search causes in, the arm, benefit and verdict of `identify`, which fits the same rows. `None` where it refuses them.
+    fn identified_from_few_poses(&self) -> Option<WrittenModel> {
+        self.few_poses.as_ref().filter(|_| self.search.full_fit.causes.is_empty())?;
+        let Identification { mut estimated, benefit, .. } =
+            as_identify(self.search.context, self.robot, identify::identify)?;
+        estimated.provenance.method = "diagnose".to_owned();
+        Some(WrittenModel { estimated, benefit })
     }
 
     /// The written arm with its benefit, or geometry alone (with a note) if only that is not refused.
@@ -153,8 +169,10 @@ impl Handover<'_> {
     /// A written arm without causes, with the estimate of `identify`: what names nothing should not write another geometry. `None` where
     /// that fit has other parameters or failed.
     fn as_identified(&self, written: &Extended) -> Option<Extended> {
-        let Fitted { parameters, priors, estimate, model, frames, problem, .. } =
-            self.identified.get_or_init(|| identified(self.search.context, self.robot)).as_ref()?;
+        let Fitted { parameters, priors, estimate, model, frames, problem, .. } = self
+            .identified
+            .get_or_init(|| as_identify(self.search.context, self.robot, fit_geometry))
+            .as_ref()?;
         let place = |p| parameters.iter().position(|q| q == p);
         let places = written.parameters.iter().map(place).collect::<Option<Vec<usize>>>()?;
         // Rows that it rejects are few: those left count as consecutive.
@@ -213,6 +231,7 @@ impl Handover<'_> {
             unseen_target: unseen_target(handed, &self.kept_rows(), &estimated),
             errors: self.errors(arm.errors),
             set_aside: (self.search.set_aside.len(), rows.rows.len()),
+            mixed: self.mixed.as_deref(),
             options,
         });
         WrittenModel { estimated, benefit: benefit.ok() }
@@ -313,8 +332,18 @@ impl Handover<'_> {
     }
 }
 
-/// Geometry fitted to the same rows as `identify` does, with the options of the diagnosis and beside the same frames.
-fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Fitted> {
+/// A fit as `identify` makes it: of geometry alone, or all of it.
+type Identify<T> = fn(
+    &Dataset,
+    &str,
+    &Model,
+    &Frames,
+    &dyn Fn(&Dataset) -> Split,
+    &identify::Options,
+) -> Result<T, IdentifyError>;
+
+/// What `identify` makes of the same rows with the options of the diagnosis and beside the same frames.
+fn as_identify<T>(context: &SearchContext<'_>, robot: &str, fit: Identify<T>) -> Option<T> {
     let SearchContext { dataset, subject, options, .. } = context;
     let defaults = identify::Options::default();
     let alone = identify::Options {
@@ -326,7 +355,7 @@ fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Fitted> {
         ..defaults
     };
     let share = |rows: &Dataset| split::random(rows, alone.held_out, alone.seed);
-    identify::fit_geometry(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
+    fit(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
 }
 
 /// The model with `causes` under the tolerances of the arm.
@@ -432,6 +461,8 @@ struct Judged<'a> {
     errors: ErrorsByStage,
     /// How many rows were set aside, of how many.
     set_aside: (usize, usize),
+    /// That the rows are those of two arms.
+    mixed: Option<&'a str>,
     options: &'a Options,
 }
 
@@ -456,6 +487,9 @@ fn judge(case: &Judged<'_>) -> Verdict {
             "the held-out error is {:.3} mm with the findings, but {:.3} mm with geometry alone",
             with_causes.random.rmse, geometric.random.rmse
         ));
+    }
+    if let Some(mixed) = case.mixed {
+        verdict.fail(mixed);
     }
     let (aside, rows) = case.set_aside;
     if too_many_aside(aside, rows) {

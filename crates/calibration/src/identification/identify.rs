@@ -16,6 +16,7 @@ use crate::identification::identifiability::Identifiability;
 use crate::identification::inflation::inflation_from_rows;
 use crate::identification::linearised_readings::widen_by_scale;
 use crate::identification::misreading;
+use crate::identification::mixed_rows::{MixedRows, mixed_rows};
 use crate::identification::parameter_table::parameter_table;
 use crate::identification::prior_width::width_uncertainty;
 use crate::identification::repeats::Repeats;
@@ -257,6 +258,10 @@ pub fn identify(
         benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
             .map(|benefit| benefit.with_unmodelled(beyond_noise))
     });
+    let left_mm = summary_on(&observed, &geometry.model, &geometry.frames).rmse;
+    let mixed = (!options.solver.as_printed)
+        .then(|| mixed_rows(&observed, nominal, frames, &options.tolerance, left_mm))
+        .flatten();
     let case = VerdictInputs {
         trained: &trained,
         geometry: &geometry,
@@ -270,6 +275,7 @@ pub fn identify(
         repeats: repeats.as_ref().and_then(Repeats::pattern),
         longer_tool: longer_tool_of(&estimated, benefit.as_ref()),
         rounded_log: rounding.note(dataset.angle_step_rad, trained.geometry.held_out.rmse),
+        mixed: mixed.as_ref().map(MixedRows::sentence),
     };
     estimated.verdict = judge(&case, options);
     Ok(Identification {
@@ -657,6 +663,8 @@ struct VerdictInputs<'a> {
     longer_tool: Option<String>,
     /// That the log rounds the angles.
     rounded_log: Option<String>,
+    /// That the rows are those of two arms.
+    mixed: Option<String>,
 }
 
 /// Share of the expected error from which what is beyond the noise is stated for longer tools.
@@ -704,6 +712,9 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
              not a model",
             options.solver.name
         ));
+    }
+    if let Some(mixed) = &case.mixed {
+        verdict.fail(mixed.as_str());
     }
     verdict.check_links(case.parameters, &options.tolerance, 0.0);
     if !case.still.is_empty() {

@@ -1,4 +1,5 @@
-//! Readings that fit no arm: whether they would if two columns were swapped, a reading were missing, or each session had its own set-up.
+//! Readings that fit no arm: whether they would if two columns were swapped, a joint counted the other way or from another zero, some rows were
+//! in another unit, a reading were missing, or each session had its own set-up.
 //!
 //! Each hypothesis is judged by the closed form for sensor frame and target with the nominal arm, since a wrong file is off by more than any
 //! arm's tolerance. Tracker positions only: a cable's single length fits too much.
@@ -8,7 +9,8 @@ use nalgebra::Vector3;
 use super::calibration::{CalibrationProblem, Frames, Weight};
 use super::start::candidate_frames;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
-use truegrind_arm::model::Model;
+use crate::measurement::row_list::row_list;
+use truegrind_arm::model::{Joints, Model};
 use truegrind_math::sentence::listed;
 use truegrind_math::statistics::median;
 
@@ -26,12 +28,18 @@ const CLOCKS_DIFFER: &str =
 /// Fewest rows to which a frame is fitted.
 const MIN_ROWS: usize = 8;
 
+/// Rows with which hypotheses on all rows are tried.
+const MANY: usize = 200;
+
+const MM_IN_METRE: f64 = 1000.0;
+
 /// The end of a message that readings are of no arm like this: what explains them, or what to check.
 pub(crate) fn advice(explanation: Option<&str>) -> String {
     match explanation {
         Some(explanation) => format!(": {explanation}"),
         None => ": check that --robot is the measured arm, that the sensor stayed where it was (a column station names its places), that no two \
-                 columns are swapped, that lengths are in mm and angles in degrees, and try --angles dh"
+                 columns are swapped, that lengths are in mm and angles in degrees, that each joint counts in the controller's direction and from its \
+                 zero, and try --angles dh"
             .to_owned(),
     }
 }
@@ -42,7 +50,13 @@ pub(crate) fn explanation(dataset: &Dataset, nominal: &Model) -> Option<String> 
         return None;
     }
     let case = Case { dataset, nominal, most_mm: SHARE * typical_mm(dataset, nominal)? };
-    case.sessions().or_else(|| case.mirrored()).or_else(|| case.swapped_joints()).or_else(|| case.shifted())
+    case.sessions()
+        .or_else(|| case.mirrored())
+        .or_else(|| case.swapped_joints())
+        .or_else(|| case.metres())
+        .or_else(|| case.radians())
+        .or_else(|| case.joint_convention())
+        .or_else(|| case.shifted())
 }
 
 fn fitted_frames(dataset: &Dataset, nominal: &Model) -> Option<Frames> {
@@ -118,6 +132,94 @@ impl Case<'_> {
                 b + 1
             )
         })
+    }
+
+    /// Some rows in metres, the others in millimetres: their readings are a thousand times as small.
+    fn metres(&self) -> Option<String> {
+        let sizes: Vec<f64> = self.dataset.rows.iter().map(|row| row.reading.place_mm().norm()).collect();
+        let (least, most) = sizes
+            .iter()
+            .fold((f64::INFINITY, 0.0_f64), |(low, high), size| (low.min(*size), high.max(*size)));
+        let between = (least.max(most * 1e-6) * most).sqrt();
+        let small: Vec<usize> = (0..sizes.len()).filter(|&row| sizes[row] < between).collect();
+        let scaled = self.with_readings(|row| {
+            let factor = if sizes[row] < between { MM_IN_METRE } else { 1.0 };
+            Some(factor * self.dataset.rows[row].reading.place_mm())
+        });
+        let is_it = !small.is_empty() && small.len() < sizes.len() && self.fits(&scaled);
+        is_it.then(|| {
+            format!(
+                "the readings fit if those of {} are metres and the others millimetres",
+                self.listed(&small)
+            )
+        })
+    }
+
+    /// Angles of some rows in radians, those of the others in degrees.
+    fn radians(&self) -> Option<String> {
+        let most = |row: usize| self.dataset.rows[row].joints.amax().to_degrees();
+        let small: Vec<usize> =
+            (0..self.dataset.rows.len()).filter(|&row| most(row) <= std::f64::consts::TAU).collect();
+        if small.is_empty() || small.len() == self.dataset.rows.len() {
+            return None;
+        }
+        let mut scaled = self.dataset.clone();
+        small.iter().for_each(|&row| scaled.rows[row].joints *= 1f64.to_degrees());
+        self.fits(&scaled).then(|| {
+            format!(
+                "the readings fit if the joint angles of {} are radians and the others degrees",
+                self.listed(&small)
+            )
+        })
+    }
+
+    /// Joints that were logged with the opposite sign, or one from a zero that is a quarter or half of a turn away. Several fit where they give the
+    /// same positions of the target: a turn of a wrist by 180° is another sign of the joint after it.
+    fn joint_convention(&self) -> Option<String> {
+        let few = self.few();
+        let fits = |change: &dyn Fn(&mut Joints)| {
+            let mut changed = few.clone();
+            changed.rows.iter_mut().for_each(|row| change(&mut row.joints));
+            self.fits(&changed)
+        };
+        let mut found: Vec<String> = Vec::new();
+        for joint in 0..6 {
+            if fits(&|joints| joints[joint] *= -1.0) {
+                found.push(format!("if q{} gets the other sign", joint + 1));
+            }
+        }
+        for (joint, deg) in (0..6).flat_map(|joint| [90.0, -90.0, 180.0].map(|deg| (joint, deg))) {
+            if fits(&|joints| joints[joint] += f64::to_radians(deg)) {
+                found.push(format!("if {deg:+.0}° are added to q{}", joint + 1));
+            }
+        }
+        if !found.is_empty() {
+            return Some(format!(
+                "the readings fit {}: check direction and zero of that joint against the data sheet (`truegrind robots`)",
+                found.join(", or ")
+            ));
+        }
+        let signs = |choice: u32| (0..6).filter(move |joint| choice >> joint & 1 == 1);
+        let mut choices: Vec<u32> = (1..1 << 6).filter(|choice: &u32| choice.count_ones() > 1).collect();
+        choices.sort_by_key(|choice| choice.count_ones());
+        let is_it = |choice: &u32| fits(&|joints| signs(*choice).for_each(|joint| joints[joint] *= -1.0));
+        let joints: Vec<String> =
+            signs(choices.into_iter().find(is_it)?).map(|joint| format!("q{}", joint + 1)).collect();
+        Some(format!(
+            "the readings fit if {} get the other sign: check the directions of these joints against the data sheet (`truegrind robots`)",
+            listed(&joints)
+        ))
+    }
+
+    /// Rows as the file numbers them.
+    fn listed(&self, rows: &[usize]) -> String {
+        row_list(&rows.iter().map(|&row| self.dataset.rows[row].number).collect::<Vec<_>>())
+    }
+
+    /// Evenly some of the rows, for hypotheses that concern all of them alike.
+    fn few(&self) -> Dataset {
+        let step = self.dataset.rows.len().div_ceil(MANY).max(1);
+        self.dataset.subset(&(0..self.dataset.rows.len()).step_by(step).collect::<Vec<_>>())
     }
 
     /// From some row on each reading belongs to the row after it, or before it.

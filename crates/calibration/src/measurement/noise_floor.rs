@@ -140,7 +140,7 @@ fn floor_on_either_side(groups: &[Readings], are_copied: bool, cut: usize) -> Op
 
 /// The noise floor of orientations (rad), from rotation vectors relative to the first reading of each pose, as the root of the
 /// sum over the coordinates. `None` where no pose was repeated or the sensor measures no orientation.
-pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
+pub fn noise_floor_rad(data: &Dataset) -> Option<(f64, usize)> {
     let turn = |row: &Row| if let Reading::Pose(pose) = &row.reading { Some(pose.rotation) } else { None };
     let mut first = None;
     let against = |row: &Row, begins: bool| {
@@ -148,7 +148,7 @@ pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
         let first = *if begins { first.insert(here) } else { first.get_or_insert(here) };
         Some((first.inverse() * here).scaled_axis())
     };
-    pooled_scatter_by(data, against).map(|floor| floor.sigma_mm)
+    pooled_scatter_by(data, against).map(|floor| (floor.sigma_mm, floor.freedom))
 }
 
 /// Pooled scatter of repeated readings without copies, of a quantity relative to the first row of its pose, outlet and approach (flagged by `true`).

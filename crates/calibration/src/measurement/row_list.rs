@@ -6,7 +6,7 @@ use truegrind_math::sentence::listed;
 const MAX_LISTED: usize = 8;
 
 /// `row 7`, `rows 3, 4 and 7`, or the first few and how many more there are.
-pub(super) fn row_list(numbers: &[usize]) -> String {
+pub(crate) fn row_list(numbers: &[usize]) -> String {
     let more = numbers.len().saturating_sub(MAX_LISTED);
     let further = (more > 0).then(|| format!("{more} more"));
     match numbers {

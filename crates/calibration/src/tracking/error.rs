@@ -43,15 +43,18 @@ pub enum TrackError {
         /// RMS residual that another geometry leaves, if it explains the poses (mm).
         changed_mm: Option<f64>,
     },
-    /// Readings from several places.
+    /// A set-up of the sensor with too few readings.
     #[error(
-        "{file}: a track follows one set-up of the sensor, and this file has {stations} stations (column station): one track for each, in a file of its own"
+        "{file}: the {rows} rows from station {station} (column station) do not place the sensor: measure at least 4 poses that are not on one line \
+         from each, and spell its name the same way in all of its rows"
     )]
-    Stations {
+    Station {
         /// File.
         file: String,
-        /// Stations there are.
-        stations: usize,
+        /// The station, as the file names it.
+        station: String,
+        /// Its rows in a row.
+        rows: usize,
     },
     /// Another sensor than before.
     #[error(

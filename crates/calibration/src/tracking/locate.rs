@@ -225,14 +225,15 @@ impl Sums {
     }
 }
 
-/// Searches all parameters, poses and forms. `residuals` and `jacobian` (column-major) have `per` rows for each pose, at the
-/// state with covariance `covariance`; `groups` can move together. `None` where the covariance is not positive definite or no
+/// Searches the first `tracked` parameters, all poses and forms; parameters beyond them are estimated and do not change. `residuals` and
+/// `jacobian` (column-major) have `per` rows for each pose, at the state with covariance `covariance`; `groups` can move together. `None` where the covariance is not positive definite or no
 /// change is determined.
 pub fn locate(
     residuals: &[f64],
     jacobian: &[f64],
     per: usize,
     covariance: &DMatrix<f64>,
+    tracked: usize,
     groups: &[Group],
 ) -> Option<Explanation> {
     let (p, n) = (covariance.nrows(), residuals.len() / per.max(1));
@@ -244,7 +245,7 @@ pub fn locate(
     let whitened = factor.l_dirty().solve_lower_triangular(&j.transpose())?;
     let explained = &j * &mg;
     let history = History { per, j, r, whitened, explained };
-    let mut best: Vec<[Option<Change>; 2]> = vec![[None; 2]; p];
+    let mut best: Vec<[Option<Change>; 2]> = vec![[None; 2]; tracked];
     let mut together: Vec<Option<GroupChange>> = vec![None; groups.len()];
     let mut sums = Sums::new(p);
     for since in (0..n).rev() {

@@ -172,6 +172,8 @@ impl Tracker {
         let problem = self.problem(&poses);
         let mut again = poses;
         for (at, record) in again.iter_mut().enumerate() {
+            // The remount is where the sensor stands now, whatever was stated before.
+            record.begins_station = false;
             let taken = self.update(&problem, at);
             record.nis = taken.nis;
             record.error_mm = self.error_mm(&problem, at, record.per_mm);

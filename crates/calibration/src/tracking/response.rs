@@ -338,7 +338,8 @@ impl Tracker {
                 j.chunks_mut(rows).for_each(|column| column[of_pose.clone()].fill(0.0));
             }
         }
-        locate(&r, &j, per, &reference.covariance()?, groups)
+        let (j, covariance) = self.with_frames_of_stations(j, reference.covariance()?);
+        locate(&r, &j, per, &covariance, p, groups)
     }
 
     /// Filters the history again with a wider covariance of the changed parameter and its alternatives, each by its own
@@ -383,6 +384,9 @@ impl Tracker {
             }
             if any {
                 self.filter.predict(&widening);
+            }
+            if poses[at].begins_station {
+                self.release_sensor();
             }
             let taken = !self.update(&problem, at).set_aside;
             if taken && !(poses[at].nis <= bound) {

@@ -42,6 +42,9 @@ pub struct PoseRecord {
     /// The same before the update, when the pose was not yet known; absent in states of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_mm: Option<f64>,
+    /// Whether the sensor was set up anew for this pose.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(super) begins_station: bool,
 }
 
 impl PoseRecord {
@@ -152,6 +155,12 @@ pub struct State {
     /// The noise that the track began with, where the first poses showed it several times too large (mm).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) replaced_sigma_mm: Option<f64>,
+    /// The present place of the sensor, as the files name it; absent where they do not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) station: Option<String>,
+    /// How readings from there are brought into the frame in which the track began; absent as long as it is that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) track_from_station: Option<[f64; 6]>,
     /// Measured region: the model's, extended by the track.
     pub region: Region,
     /// Pose number before which no further alarm is raised, after an unexplained one.

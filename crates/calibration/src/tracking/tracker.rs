@@ -1,5 +1,7 @@
 //! The filter that follows an arm, pose by pose.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::alarm::{Alarm, Course};
@@ -9,18 +11,19 @@ use super::first_noise::FirstPoses;
 use super::gauge::Gauge;
 use super::options::Options;
 use super::state::{ConsumedFile, PoseRecord, SCHEMA, Snapshot, State, digest, extend_region};
+use super::station::{end_of_station, moved, number_of, station_of};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{Observations, frame_parameters};
 use crate::identification::identify::prepare_observations;
 use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
-use crate::measurement::dataset::{Dataset, Reading, Row};
+use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::filter::rls::{Memory, RecursiveLeastSquares};
-use truegrind_estimation::problem::Problem;
+use truegrind_estimation::problem::{Prior, Problem};
 use truegrind_math::se3::{pose_from_vector, vector_from_pose};
 
 /// At least `poses` first rows of files that are tracked together: the first file, and further ones as needed. `None` without
@@ -32,7 +35,17 @@ pub fn first_poses(datasets: &[Dataset], poses: usize) -> Option<Dataset> {
         if out.rows.len() >= poses {
             break;
         }
-        out.rows.extend(dataset.rows.iter().cloned());
+        // Each file numbers its stations anew.
+        let mut names = std::mem::take(&mut out.station_names);
+        let rows = (0..dataset.rows.len()).map(|row| {
+            let anchor = match station_of(dataset, row) {
+                Some(name) => number_of(name, &mut names),
+                None => dataset.rows[row].anchor,
+            };
+            Row { anchor, ..dataset.rows[row].clone() }
+        });
+        out.rows.extend(rows.collect::<Vec<_>>());
+        out.station_names = names;
         files += 1;
     }
     if files > 1 {
@@ -44,21 +57,21 @@ pub fn first_poses(datasets: &[Dataset], poses: usize) -> Option<Dataset> {
 /// Covariance at the start of a track: the model's for the arm, a wide prior for the sensor.
 fn first_covariance(model: &Estimated, parameters: &[Parameter]) -> DMatrix<f64> {
     let (arm, p) = (model.order.len(), parameters.len());
-    // The sensor was registered with a few poses under this model, so its frame is off by no more than links of ordinary
-    // tolerance can shift it. The poses used for registration are filtered like all others.
-    let priors = Tolerance {
-        target_mm: 10.0,
-        target_rad: 0.02,
-        frame_mm: 20.0,
-        frame_rad: 0.04,
-        ..Tolerance::default()
-    }
-    .priors(parameters, &model.model);
+    let priors = frame_priors(model, parameters);
     DMatrix::from_fn(p, p, |i, j| match (i < arm && j < arm, i == j) {
         (true, _) => model.covariance[(i, j)] + if i == j { MIN_VARIANCE } else { 0.0 },
         (false, true) => priors[i].sigma * priors[i].sigma,
         (false, false) => 0.0,
     })
+}
+
+/// Priors of the parameters of the measurement.
+///
+/// The sensor was registered with a few poses under this model, so its frame is off by no more than links of ordinary tolerance can shift it.
+/// The poses used for registration are filtered like all others.
+pub(super) fn frame_priors(model: &Estimated, parameters: &[Parameter]) -> Vec<Prior> {
+    Tolerance { target_mm: 10.0, target_rad: 0.02, frame_mm: 20.0, frame_rad: 0.04, ..Tolerance::default() }
+        .priors(parameters, &model.model)
 }
 
 /// Recursive estimator of one arm's parameters.
@@ -84,13 +97,22 @@ pub struct PoseUpdate {
     pub set_aside: bool,
 }
 
-/// One frame of the sensor is followed.
-fn refuse_stations(dataset: &Dataset) -> Result<(), TrackError> {
-    match dataset.stations() {
-        1 => Ok(()),
-        stations => Err(TrackError::Stations { file: dataset.file.clone(), stations }),
-    }
+/// The rows that register the sensor: the first ones, or as many of them as were read from the first place. Fewer than `poses` must be all that
+/// can come from there.
+fn rows_to_register(dataset: &Dataset, poses: usize) -> Option<Dataset> {
+    let end = if dataset.rows.is_empty() { 0 } else { end_of_station(dataset, 0) };
+    let is_over = end < dataset.rows.len() && end >= FEWEST_FIRST;
+    let count = if end < poses && !is_over { return None } else { end.min(poses) };
+    let mut first = dataset.subset(&(0..count).collect::<Vec<_>>());
+    first
+        .rows
+        .iter_mut()
+        .for_each(|row| row.anchor = if dataset.sensor == Sensor::Cable { row.anchor } else { 0 });
+    Some(first)
 }
+
+/// Fewest poses that register the sensor where it was set up elsewhere after them.
+const FEWEST_FIRST: usize = 8;
 
 impl Tracker {
     /// Registers the sensor with the first poses of `dataset`; no pose is filtered yet.
@@ -103,18 +125,14 @@ impl Tracker {
         dataset: &Dataset,
         options: &Options,
     ) -> Result<Self, TrackError> {
-        refuse_stations(dataset)?;
-        if dataset.rows.len() < options.first_poses {
-            return Err(TrackError::TooFew {
-                file: dataset.file.clone(),
-                found: dataset.rows.len(),
-                asked: options.first_poses,
-            });
-        }
-        let first = dataset.subset(&(0..options.first_poses).collect::<Vec<_>>());
+        let first = rows_to_register(dataset, options.first_poses).ok_or_else(|| TrackError::TooFew {
+            file: dataset.file.clone(),
+            found: dataset.rows.len(),
+            asked: options.first_poses,
+        })?;
         let (observed, _) = prepare_observations(&first, &model.nominal, false);
         let FirstPoses { frames, sigma_mm, sigma_rad } = FirstPoses::of(model, &observed, options)?;
-        let sensing = frame_parameters(dataset);
+        let sensing = frame_parameters(&observed.dataset);
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
         let covariance = first_covariance(model, &parameters);
         let filter =
@@ -145,6 +163,8 @@ impl Tracker {
             placed_at: options.first_poses + options.window.max(1),
             start_scatter: None,
             replaced_sigma_mm: None,
+            station: station_of(dataset, 0),
+            track_from_station: None,
             region: model.region.clone(),
             quiet_until: 0,
             pending_since: 0,
@@ -200,7 +220,6 @@ impl Tracker {
                 expected: self.state.sensor.name(),
             });
         }
-        refuse_stations(dataset)?;
         let done = self.state.consumed.iter().position(|c| c.file == dataset.file);
         let from = done.map_or(0, |at| self.state.consumed[at].rows);
         if let Some(at) = done {
@@ -219,7 +238,40 @@ impl Tracker {
         if from == dataset.rows.len() {
             return Ok(Vec::new());
         }
-        let fresh = dataset.subset(&(from..dataset.rows.len()).collect::<Vec<_>>());
+        let mut alarms = Vec::new();
+        let mut next = from;
+        while next < dataset.rows.len() {
+            let end = end_of_station(dataset, next);
+            let station = station_of(dataset, next);
+            let begins = station.is_some() && station != self.state.station;
+            // Rows that do not place another set-up yet wait for more of them.
+            if begins && !self.begin_station(dataset, (next, end), end < dataset.rows.len())? {
+                break;
+            }
+            alarms.extend(self.process_rows(dataset, next..end, begins));
+            next = end;
+        }
+        if next == from {
+            return Ok(alarms);
+        }
+        let consumed = ConsumedFile {
+            file: dataset.file.clone(),
+            rows: next,
+            digest: digest(dataset.rows.iter().take(next)),
+        };
+        match done {
+            Some(at) => self.state.consumed[at] = consumed,
+            None => self.state.consumed.push(consumed),
+        }
+        self.state.now = Snapshot::of(&self.filter, self.state.history.len());
+        Ok(alarms)
+    }
+
+    /// Filters rows that were read from one place, which `begins` with them or not.
+    fn process_rows(&mut self, dataset: &Dataset, rows: Range<usize>, begins: bool) -> Vec<Alarm> {
+        let mut fresh = dataset.subset(&rows.collect::<Vec<_>>());
+        let track_from_station = self.track_from_station();
+        fresh.rows.iter_mut().for_each(|row| *row = moved(row, &track_from_station));
         let (observed, _) = prepare_observations(&fresh, &self.initial.nominal, false);
         let mut record = self.pose_records(&observed);
         let mut problem = self.problem(&record);
@@ -227,7 +279,15 @@ impl Tracker {
         for (at, row) in observed.dataset.rows.iter().enumerate() {
             self.condition = *row.condition;
             let sigma_mm = self.state.sigma_mm;
-            let alarm = self.process_pose(&problem, at, record[at].clone());
+            let begins_station = begins && at == 0;
+            if begins_station {
+                self.release_sensor();
+                // A turn about axis 1 shows against one place of the sensor alone.
+                self.state.placed = None;
+                self.state.placed_at = self.state.poses + self.state.options.window.max(1);
+            }
+            let own = PoseRecord { begins_station, ..record[at].clone() };
+            let alarm = self.process_pose(&problem, at, own);
             let is_mounted = alarm.as_ref().is_some_and(|alarm| alarm.course == Course::Mounted);
             if is_mounted || self.state.sigma_mm != sigma_mm {
                 // The frames have changed, and with them the weights of rounded angles; or the noise.
@@ -236,17 +296,7 @@ impl Tracker {
             }
             alarms.extend(alarm);
         }
-        let consumed = ConsumedFile {
-            file: dataset.file.clone(),
-            rows: dataset.rows.len(),
-            digest: digest(dataset.rows.iter()),
-        };
-        match done {
-            Some(at) => self.state.consumed[at] = consumed,
-            None => self.state.consumed.push(consumed),
-        }
-        self.state.now = Snapshot::of(&self.filter, self.state.history.len());
-        Ok(alarms)
+        alarms
     }
 
     /// Observation `at` of `problem`, which is `record`. Gives the alarm, where it raises one.
@@ -357,6 +407,7 @@ impl Tracker {
             nis: 0.0,
             error_mm: 0.0,
             predicted_mm: None,
+            begins_station: false,
         };
         observed.dataset.rows.iter().zip(&weights).map(one).collect()
     }

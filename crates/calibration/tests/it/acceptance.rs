@@ -225,8 +225,10 @@ fn the_uncertainty_of_the_orientation_comes_from_repeats() {
     let found = accept(&data, &model, &Options { tolerance_rad: Some(0.01), ..options(1.0) }).unwrap();
     let turns = found.orientation.unwrap();
     assert_eq!((turns.uncertainty, turns.decision), (Uncertainty::Repeats, Decision::Accepted));
-    // Two readings that differ by d scatter by d / √2.
-    assert!((turns.uncertainty_rad - 2.0 * sigma).abs() < 1e-9, "{}", turns.uncertainty_rad);
+    // Two readings that differ by d scatter by d / √2: forty pairs, three angles each.
+    let scatter = turns.scatter.unwrap();
+    assert!((scatter.sigma - sigma).abs() < 1e-9 && scatter.freedom == 120, "{scatter:?}");
+    assert!((turns.uncertainty_rad / sigma - 2.0205).abs() < 1e-3, "{}", turns.uncertainty_rad);
     assert!(turns.model.max < 0.003 && turns.model.rmse > 0.0003, "{:?}", turns.model);
 }
 
@@ -281,6 +283,28 @@ fn the_larger_of_the_stated_and_the_seen_uncertainty_counts() {
     let (unstated, low, high) = (of(None), of(Some(0.005)), of(Some(1.0)));
     assert_eq!((low.uncertainty, low.stated_mm), (Uncertainty::AboveStated, Some(0.005)));
     assert_eq!((low.uncertainty_mm, low.decision), (unstated.uncertainty_mm, unstated.decision));
+    assert!(unstated.scatter.unwrap().coverage_factor() < 2.01, "{:?}", unstated.scatter);
     assert_eq!((high.uncertainty, high.uncertainty_mm), (Uncertainty::Stated, 1.0));
     assert_ne!(low.overall(), Decision::Accepted);
+}
+
+/// The scatter of one pair is known by three degrees of freedom: its factor is that of Student's t (GUM, table G.2), and a stated
+/// uncertainty is not refuted by a pair that scatters more by chance.
+#[test]
+fn one_repeated_pair_has_a_larger_factor() {
+    let model = model(&dataset(rows(0.1, 120)));
+    let of = |apart_mm: f64, uncertainty_mm| {
+        let mut all = rows(0.7, 110);
+        let Reading::Position(at) = all[5].reading.clone() else { panic!("a position") };
+        all.push(Row::new(110, all[5].joints, Reading::Position(at + Vector3::z() * apart_mm)));
+        accept(&dataset(all), &model, &Options { uncertainty_mm, ..options(1.0) }).unwrap()
+    };
+    let sigma = 0.03 / 2f64.sqrt();
+    let unstated = of(0.03, None);
+    assert_eq!(unstated.scatter.unwrap().freedom, 3);
+    assert!((unstated.uncertainty_mm / sigma - 3.307).abs() < 2e-3, "{}", unstated.uncertainty_mm);
+    let by_chance = of(0.03, Some(0.03));
+    assert!((by_chance.uncertainty_mm / sigma - 2.0).abs() < 1e-6, "{}", by_chance.uncertainty_mm);
+    // An absurdly small statement gains nothing.
+    assert_eq!(of(0.03, Some(1e-6)).uncertainty_mm, unstated.uncertainty_mm);
 }

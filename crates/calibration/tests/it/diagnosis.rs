@@ -2,7 +2,7 @@
 
 #[path = "diagnosis/simulator.rs"]
 #[allow(dead_code, unreachable_pub)]
-mod simulator;
+pub(crate) mod simulator;
 #[path = "diagnosis/scenarios.rs"]
 #[allow(dead_code, unreachable_pub)]
 pub(crate) mod scenarios;

@@ -2,6 +2,7 @@
 
 mod beyond_noise;
 mod calibration;
+mod mixed_rows;
 mod prior_width;
 mod promise;
 mod repeats;

@@ -1,6 +1,7 @@
 //! A simulated arm that is watched: what moves is named, and a stop changes nothing.
 
 mod hidden_changes;
+mod set_ups;
 
 use std::sync::OnceLock;
 
@@ -220,7 +221,7 @@ fn a_change_is_found_as_least_squares_with_one_parameter_more_finds_it() {
         };
         // Residuals are model minus reading: the model has not followed.
         let r = DVector::from_fn(n * per, |i, _| random() - size * weight(i / per) * j[(i, 1)]);
-        let found = locate(r.as_slice(), j.as_slice(), per, &covariance, &[]).unwrap();
+        let found = locate(r.as_slice(), j.as_slice(), per, &covariance, covariance.nrows(), &[]).unwrap();
         assert!(found.together.is_none() && found.nearly.is_none());
         assert_eq!((found.best.parameter, found.best.form), (1, form));
         assert!(found.best.since.abs_diff(22) <= 1, "{found:?}");

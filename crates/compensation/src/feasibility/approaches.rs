@@ -13,13 +13,8 @@ use rayon::prelude::*;
 use crate::cut::{CutsOf, Obstacle, StartsOf, follows_position, may_cut};
 use crate::deviation::MotionStatus;
 use crate::plan::reason::OutcomeReason;
-<<<<<<< HEAD
-use crate::search_budget::MANY;
-use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
-=======
 use crate::search_budget::MANY_MOTIONS;
-use truegrind_programs::motion::{Listing, Motion, MotionKind};
->>>>>>> repW
+use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
 
 /// The starts of the lines and arcs of a program.
 pub(crate) struct Starts<'a> {
@@ -122,15 +117,10 @@ impl<'a> Starts<'a> {
                     let uncorrected = match blocking_reason(start) {
                         None => found.get(&start).copied().or_else(of_cut),
                         Some((status, reason)) => {
-<<<<<<< HEAD
-                            let is_refused =
-                                status == Status::Refused || matches!(reason, OutcomeReason::Risk { .. });
+                            let is_refused = status == MotionStatus::Refused
+                                || matches!(reason, OutcomeReason::Risk { .. });
                             unknown = is_refused || shift.exceeds(index, true);
                             Some(reason).filter(|_| is_refused || self.is_on_part(start))
-=======
-                            let is_risk = matches!(reason, OutcomeReason::Risk { .. });
-                            Some(reason).filter(|_| status == MotionStatus::Refused || is_risk)
->>>>>>> repW
                         }
                     };
                     let may_be_wedge = || self.may_be_wedge(start, index) && !self.is_drawn_back(start);
@@ -193,10 +183,10 @@ impl<'a> Starts<'a> {
 
     /// Whether a motion remains unmodified from whose end another might lead on: most programs have none.
     fn any_left(&self, blocking_reason: Obstacle<'_>) -> bool {
-        let motions = (0..self.listing.motions.len() as u32).into_par_iter().with_min_len(MANY);
+        let motions = (0..self.listing.motions.len() as u32).into_par_iter().with_min_len(MANY_MOTIONS);
         motions.any(|index| {
             blocking_reason(index).is_some_and(|(status, reason)| {
-                status == Status::Refused
+                status == MotionStatus::Refused
                     || matches!(reason, OutcomeReason::Risk { .. })
                     || self.meets_part(index)
             })

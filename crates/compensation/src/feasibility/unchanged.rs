@@ -35,14 +35,8 @@ pub(crate) fn unchanged_motions(
     // For segments that start where another motion remains unmodified, over all rounds.
     let mut budget = SearchBudget::of(search_budget::WAYS);
     let mut forbidden = forbid_segments(listing, solved, frame_table, arms, options, None, &mut budget);
-<<<<<<< HEAD
-    let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
-    let has_starts = options.cuts != Cuts::Single;
-=======
     let mut rounds = (MAX_VISITS / listing.motions.len().max(1)).clamp(MIN_ROUNDS, MAX_ROUNDS);
-    // Lines of NC programs have no stops, and their air moves are judged once they are written.
-    let has_starts = !listing.numbered && options.cuts != Cuts::Single;
->>>>>>> repW
+    let has_starts = options.cuts != Cuts::Single;
     let starts = has_starts.then(|| Starts::of(listing, cuts, options.cuts == Cuts::Whole));
     loop {
         let before = out.len();

@@ -36,6 +36,8 @@ pub struct Options {
     pub geometry: bool,
     /// Non-centrality from which an effect counts as detected.
     pub decisive: f64,
+    /// Load that the flange may carry (kg), where known: what it would decide is stated.
+    pub rated_load_kg: Option<f64>,
     /// Seed of all random numbers.
     pub seed: u64,
 }
@@ -55,6 +57,7 @@ impl Default for Options {
             field_poses: FIELD_POSES,
             geometry: true,
             decisive: 25.0,
+            rated_load_kg: None,
             seed: 0,
         }
     }

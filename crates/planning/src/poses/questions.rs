@@ -17,7 +17,7 @@ use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::diagnosis::cause_kind::CauseKind;
-use truegrind_calibration::diagnosis::finding::{Confidence, SCHEMA};
+use truegrind_calibration::diagnosis::finding::{Confidence, FoundParameter, SCHEMA};
 use truegrind_calibration::diagnosis::something_else::SomethingElse;
 
 /// A candidate cause.
@@ -30,10 +30,12 @@ pub struct CandidateCause {
 }
 
 /// An ambiguous finding with its alternative causes.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Question {
     /// The finding, then its alternatives; a single cause for an effect that could not be tested.
     pub causes: Vec<CandidateCause>,
+    /// The found parameters of the finding's effects, where the diagnosis states them.
+    pub size: Option<Vec<f64>>,
 }
 
 /// Why a diagnosis file cannot be read.
@@ -105,6 +107,9 @@ struct Finding {
     confidence: Confidence,
     joints: Option<Vec<usize>>,
     alternatives: Vec<Named>,
+    // Unknown to files that others write.
+    #[serde(default)]
+    parameters: Vec<FoundParameter>,
 }
 
 #[derive(Deserialize)]
@@ -169,7 +174,11 @@ impl Finding {
         let first = cause(self.effect, self.joints.as_ref())?;
         let others = self.alternatives.iter().map(|other| cause(other.effect, other.joints.as_ref()));
         let others = others.collect::<Result<Vec<_>, _>>()?;
-        Ok(Question { causes: std::iter::once(first).chain(others).collect() })
+        let size: Vec<f64> = self.parameters.iter().map(|parameter| parameter.value).collect();
+        Ok(Question {
+            causes: std::iter::once(first).chain(others).collect(),
+            size: (!size.is_empty()).then_some(size),
+        })
     }
 }
 
@@ -213,7 +222,7 @@ pub fn questions(text: &str) -> Result<Vec<Question>, DiagnosisFileError> {
         }
     }
     for untested in &file.not_testable {
-        out.push(Question { causes: vec![cause(untested.effect, untested.joints.as_ref())?] });
+        out.push(Question { causes: vec![cause(untested.effect, untested.joints.as_ref())?], size: None });
     }
     Ok(out)
 }

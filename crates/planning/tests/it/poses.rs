@@ -20,6 +20,7 @@ use truegrind_planning::poses::cable::{clearance_mm, segment_distance};
 use truegrind_planning::poses::candidate::{Bounds, draw};
 use truegrind_planning::poses::design::{Design, Index};
 use truegrind_planning::poses::keep_out::{KeepOut, is_clear};
+use truegrind_planning::poses::parting::DECIDES;
 use truegrind_planning::poses::program::{ProgramSettings, draft};
 use truegrind_planning::poses::questions::{CandidateCause, DiagnosisFileError, effects_of, open, questions};
 use truegrind_planning::poses::rows::{Noise, ReadingJacobian, rig};
@@ -331,7 +332,7 @@ fn too_narrow_bounds_say_what_failed() {
     let error = plan(&setup, &options).unwrap_err();
     assert!(matches!(error, PlanError::TooFew { found: 0, .. }));
     assert!(error.to_string().contains("outside the box"), "{error}");
-    let questions = vec![truegrind_planning::poses::questions::Question { causes: Vec::new() }];
+    let questions = vec![truegrind_planning::poses::questions::Question { causes: Vec::new(), size: None }];
     let options = Options { index: Index::O1, questions, ..small() };
     assert_eq!(plan(&setup, &options), Err(PlanError::IndexOfQuestions));
 }
@@ -725,13 +726,41 @@ fn a_finding_is_planned_for_by_its_number() {
     }
 }
 
+/// A plan says how far its rows part a finding and its rivals: with the square of the finding's size, and never better than without a rival.
+#[test]
+fn a_plan_says_whether_it_decides() {
+    let of = |effect, joint| CandidateCause { effect, joints: vec![joint] };
+    let parted = |size: f64| {
+        let question = truegrind_planning::poses::questions::Question {
+            causes: vec![
+                of(CauseKind::JointCompliance, 1),
+                of(CauseKind::LinkBending, 1),
+                of(CauseKind::GearRatio, 4),
+                CandidateCause { effect: CauseKind::Latency, joints: Vec::new() },
+            ],
+            size: Some(vec![size]),
+        };
+        let options = Options { questions: vec![question], rated_load_kg: Some(3.0), ..small() };
+        planned(Sensor::Position, &tracker(), &options).partings.remove(0)
+    };
+    let (small, large) = (parted(5e-6), parted(1e-4));
+    let mut alike = small.alike.each_ref().map(|cause| cause.effect.as_str());
+    alike.sort_unstable();
+    assert_eq!(alike, ["joint-compliance", "link-bending"]);
+    assert_eq!(small.not_computed, [CauseKind::Latency]);
+    assert!((large.lambda / small.lambda / 400.0 - 1.0).abs() < 0.05, "{small:?} {large:?}");
+    assert!(small.lambda < small.alone && !small.decides() && large.decides(), "{small:?} {large:?}");
+    assert!(small.with_load.unwrap().lambda > small.lambda, "{small:?}");
+    assert!((small.times_as_many() * small.lambda - DECIDES).abs() < 1e-6);
+}
+
 /// A diagnosis sends to `plan` only those whose question `plan` has an answer for.
 #[test]
 fn what_poses_are_said_to_decide_changes_the_plan() {
     for effect in DECIDED_BY_POSES {
         let cause = CandidateCause { effect, joints: Vec::new() };
         let by_pose = !effects_of(&cause).is_empty();
-        let question = truegrind_planning::poses::questions::Question { causes: vec![cause] };
+        let question = truegrind_planning::poses::questions::Question { causes: vec![cause], size: None };
         let options = Options { questions: vec![question], ..small() };
         let (asked, plain) =
             (planned(Sensor::Cable, &cable(), &options), planned(Sensor::Cable, &cable(), &small()));

@@ -98,12 +98,13 @@ fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
 fn what_to_check(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Cable => {
-            "that the cable runs free and its hook holds, that it is wound in one layer and not over a pulley, that the outlet stayed \
+            "that all rows are of one arm and that the joint angles in each are those of its reading, that the cable runs free and its hook holds, \
+             that it is wound in one layer and not over a pulley, that the outlet stayed \
              in one place, and the sensor itself against a known length"
         }
         Sensor::Position | Sensor::Pose => {
-            "that the tracker read in one face, that one target in one nest was read, that the tracker stayed in one place, and the \
-             sensor itself against a known length"
+            "that all rows are of one arm and that the joint angles in each are those of its reading, that the tracker read in one face, that one \
+             target in one nest was read, that the tracker stayed in one place, and the sensor itself against a known length"
         }
     }
 }

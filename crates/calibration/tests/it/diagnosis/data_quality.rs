@@ -7,8 +7,10 @@ use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::{Alternative, Confidence, Finding};
 use truegrind_calibration::diagnosis::transfer::new_rows;
+use truegrind_calibration::identification::identify;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::split;
 
 use super::scenarios::frames;
 use super::simulator::{Hidden, Log, Setup, run};
@@ -177,6 +179,23 @@ fn of_too_few_poses_no_benefit_is_stated() {
     assert_eq!(verdict.status, Judgement::Doubtful, "{verdict:?}");
     assert!(verdict.reasons[0].text.contains("too few"), "{verdict:?}");
     assert!(!verdict.reasons.iter().any(|reason| reason.text.contains("expected RMS")), "{verdict:?}");
+}
+
+/// Poses that are too few to search causes in may well determine the links: then the arm and its verdict are those of `identify`.
+#[test]
+fn few_poses_have_the_verdict_of_identify() {
+    let mut dataset = run(&arm(), &[], &setup(200, 53)).dataset;
+    dataset.rows = dataset.rows.iter().take(17).cloned().collect::<Vec<_>>().into();
+    let found = diagnosed(&dataset, &arm());
+    assert!(found.diagnosis.poses_needed.is_some() && found.diagnosis.notes[0].contains("too few"));
+    let options =
+        identify::Options { tolerance: Options::default().arm_tolerance, ..identify::Options::default() };
+    let share = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
+    let frames = frames(&dataset, &arm());
+    let own = identify::identify(&dataset, "arm", &arm(), &frames, &share, &options).unwrap();
+    assert_eq!(found.estimated.verdict, own.estimated.verdict);
+    assert_eq!(found.estimated.model, own.estimated.model);
+    assert_eq!(own.estimated.verdict.status, Judgement::NotEvaluated, "{:?}", own.estimated.verdict);
 }
 
 /// Another series of the same arm judges the arm that is written: here first as it is, then one that is worse than geometry there.
