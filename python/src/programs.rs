@@ -388,7 +388,7 @@ pub(crate) fn compensate_(
             }
         },
         max_risk,
-        condition: stated.on(&estimated.arm.model, &estimated.arm.condition)?,
+        condition: stated.on(&estimated.arm.condition)?,
         points: true,
         ..CompensateOptions::default()
     };
@@ -569,7 +569,7 @@ pub(crate) fn deviation_(
     let originals = intended.as_deref().map(sources).transpose()?;
     let place = Place::read(cell.as_deref(), surface)?;
     let stated = Stated { payload_kg, payload_centre_mm, ..Stated::default() };
-    let condition = stated.on(&estimated.arm.model, &estimated.arm.condition)?;
+    let condition = stated.on(&estimated.arm.condition)?;
     let actual = actual.as_deref();
     let originals = originals.as_ref();
     let task = Run { estimated, actual, programs: &programs, originals, condition, tolerance_mm };
