@@ -218,8 +218,14 @@ pub(crate) struct PyCompensation {
 
 impl PyCompensation {
     fn files(&self) -> Vec<ProgramFile> {
-        let names = self.sources.files.iter();
-        names.map(|(name, _)| ProgramFile { file: name.clone(), output: None }).collect()
+        let files = self.sources.files.iter().zip(&self.corrected);
+        files
+            .map(|((name, source), corrected)| ProgramFile {
+                file: name.clone(),
+                output: None,
+                unchanged: source == corrected,
+            })
+            .collect()
     }
 }
 
