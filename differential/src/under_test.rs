@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use nalgebra::Point3;
 use truegrind::arm::estimated::Estimated;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::{CompensateError, Compensated, compensate};
@@ -148,7 +147,7 @@ pub fn corrected_task(
     let mut condition = estimated.condition;
     if let Some((kg, centre)) = options.payload {
         condition.payload_kg = Some(kg);
-        condition.payload_centre_mm = (estimated.model.flange * Point3::from(centre)).coords.into();
+        condition.payload_centre_mm = centre;
     }
     let wanted = options::Options {
         emit: if options.emit_joints { Emit::Joints } else { Emit::Targets },

@@ -49,11 +49,11 @@ pub(crate) struct Stated {
 const MAX_PAYLOAD_KG: f64 = 3000.0;
 
 impl Stated {
-    /// The condition of a call. The centre of mass is stated in the flange frame and stored in the last link frame.
+    /// The condition of a call.
     ///
     /// # Errors
     /// A mass out of range.
-    pub(crate) fn on(&self, arm: &Model, own: &Condition) -> Result<Condition, Refusal> {
+    pub(crate) fn on(&self, own: &Condition) -> Result<Condition, Refusal> {
         if let Some(kg) = self.payload_kg
             && !(0.0..=MAX_PAYLOAD_KG).contains(&kg)
         {
@@ -62,13 +62,9 @@ impl Stated {
         if self.payload_centre_mm.is_some() && self.payload_kg.is_none() {
             return Err(Refusal::argument("payload_kg", "nothing", "the mass whose centre is stated"));
         }
-        let centre = self.payload_centre_mm.map(|centre| {
-            let centre = arm.flange * nalgebra::Point3::from(centre);
-            centre.coords.into()
-        });
         Ok(Condition {
             payload_kg: self.payload_kg.or(own.payload_kg),
-            payload_centre_mm: centre.unwrap_or(own.payload_centre_mm),
+            payload_centre_mm: self.payload_centre_mm.unwrap_or(own.payload_centre_mm),
             temperature_c: self.temperature_c.or(own.temperature_c),
             time_h: self.time_h.or(own.time_h),
             ..*own
@@ -85,7 +81,7 @@ pub(crate) fn forward<'py>(
 ) -> PyResult<Object<'py, Poses>> {
     let q_deg = numbers("q_deg", q_deg)?;
     let (q_deg, one) = rows("q_deg", q_deg.as_array(), 6)?;
-    let condition = stated.on(acting.arm, &acting.condition)?;
+    let condition = stated.on(&acting.condition)?;
     let (position, rotation) = arrays::forward(py, acting.arm, &condition, q_deg)?;
     let position = shaped(position.into_any(), one)?;
     let rotation = shaped(rotation.into_any(), one)?;
@@ -104,7 +100,7 @@ pub(crate) fn inverse<'py>(
     let position_mm = numbers("position_mm", position_mm)?;
     let (places, one) = rows("position_mm", position_mm.as_array(), 3)?;
     let targets = arrays::poses(places, numbers("rotation", rotation)?.as_array())?;
-    let condition = stated.on(acting.arm, &acting.condition)?;
+    let condition = stated.on(&acting.condition)?;
     let seeds = match near_deg {
         None => vec![Joints::zeros(); targets.len()],
         Some(near) => {

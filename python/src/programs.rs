@@ -218,8 +218,14 @@ pub(crate) struct PyCompensation {
 
 impl PyCompensation {
     fn files(&self) -> Vec<ProgramFile> {
-        let names = self.sources.files.iter();
-        names.map(|(name, _)| ProgramFile { file: name.clone(), output: None }).collect()
+        let files = self.sources.files.iter().zip(&self.corrected);
+        files
+            .map(|((name, source), corrected)| ProgramFile {
+                file: name.clone(),
+                output: None,
+                unchanged: source == corrected,
+            })
+            .collect()
     }
 }
 
@@ -388,7 +394,7 @@ pub(crate) fn compensate_(
             }
         },
         max_risk,
-        condition: stated.on(&estimated.arm.model, &estimated.arm.condition)?,
+        condition: stated.on(&estimated.arm.condition)?,
         points: true,
         ..CompensateOptions::default()
     };
@@ -569,7 +575,7 @@ pub(crate) fn deviation_(
     let originals = intended.as_deref().map(sources).transpose()?;
     let place = Place::read(cell.as_deref(), surface)?;
     let stated = Stated { payload_kg, payload_centre_mm, ..Stated::default() };
-    let condition = stated.on(&estimated.arm.model, &estimated.arm.condition)?;
+    let condition = stated.on(&estimated.arm.condition)?;
     let actual = actual.as_deref();
     let originals = originals.as_ref();
     let task = Run { estimated, actual, programs: &programs, originals, condition, tolerance_mm };

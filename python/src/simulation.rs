@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use truegrind::robots::foreign::ImportOptions;
+use truegrind::robots::foreign::{ImportOptions, Kind as Format};
 use truegrind::{Recipe, Simulation, read_measurements};
 
 use crate::dataset::PyDataset;
@@ -68,7 +68,10 @@ pub(crate) fn simulate(
         let mut recipe = Recipe::parse(&text, &file)?;
         recipe.seed = seed.map_or(Ok(recipe.seed), |seed| whole("seed", seed))?;
         let resolve = |name: &str| {
-            let found = from_name(Path::new(name), &ImportOptions::default());
+            let beside = Path::new(&file).with_file_name(name);
+            let is_beside = Format::of(name).is_some() && beside.is_file();
+            let named = if is_beside { beside.as_path() } else { Path::new(name) };
+            let found = from_name(named, &ImportOptions::default());
             let said = |error: PyErr| Python::attach(|py| error.value(py).to_string());
             found.map(|(robot, _)| robot.model).map_err(said)
         };

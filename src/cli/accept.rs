@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     // Refuses a robot other than that of the model.
     let stated = arguments.robot.as_deref().map(|name| arguments.links.of(name));
     inputs::nominal(&named, stated)?;
-    let robot = stated.unwrap_or(arm.robot.as_str().into());
+    let robot = inputs::measured_robot(arm, stated)?;
     let data = DataArguments {
         points: arguments.points.clone(),
         sheet: arguments.sheet.clone(),

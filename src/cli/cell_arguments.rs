@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
-use nalgebra::Point3;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::effect::Effect;
 use truegrind::arm::estimated::Estimated;
@@ -72,9 +71,7 @@ impl CellArguments {
         let mut condition = model.map(|m| m.condition).unwrap_or_default();
         condition.payload_kg = self.payload.or(condition.payload_kg);
         if let Some(text) = &self.payload_centre {
-            let on_flange = Point3::from(super::stated_frames::triple("--payload-centre", text)?);
-            let in_last_link = model.map_or(on_flange, |arm| arm.model.flange * on_flange);
-            condition.payload_centre_mm = in_last_link.coords.into();
+            condition.payload_centre_mm = super::stated_frames::triple("--payload-centre", text)?;
         }
         Ok((cell, surface, condition))
     }
@@ -105,9 +102,9 @@ impl CellArguments {
     }
 
     /// Notes the loads of a program that are above the rated payload.
-    pub(super) fn note_stated_overload(&self, program: &Program<'_>, robot: &str, nominal: &Model) {
+    pub(super) fn note_stated_overload(&self, program: &Program<'_>, robot: &str) {
         let loads = self.loads(program);
-        let stated = loads.and_then(|loads| stated_overload(program.listing(), &loads, robot, nominal));
+        let stated = loads.and_then(|loads| stated_overload(program.listing(), &loads, robot));
         if let Some(stated) = stated {
             print_message(format_args!("note: {}", stated.note));
         }

@@ -344,8 +344,8 @@ impl DeviationContext<'_> {
         refuse_other_original(&name, task.listing(), original.as_ref().map(|original| original.listing()))?;
         // The original defines the intended path.
         let cell = self.arguments;
-        if let Some(Runner { robot: Some(robot), nominal, .. }) = self.runners.first() {
-            cell.note_stated_overload(&task, robot, nominal);
+        if let Some(Runner { robot: Some(robot), .. }) = self.runners.first() {
+            cell.note_stated_overload(&task, robot);
         }
         let loads = [original.as_ref().unwrap_or(&task), &task].map(|program| cell.loads(program));
         let text_differences =

@@ -77,7 +77,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     notes.extend(lost_in_export(&arm.model, format));
     notes.push(match &arguments.data {
         Some(data) => {
-            let measured = DataArguments::of(data.clone(), stated.unwrap_or(arm.robot.as_str().into()));
+            let measured = DataArguments::of(data.clone(), inputs::measured_robot(arm, stated)?);
             measured_error(&measured, arm, &read_back(&bare, &arm.robot, format)?)?
         }
         None => stated_error(arm),

@@ -62,6 +62,11 @@ pub(super) fn expect(path: &Path) -> anyhow::Result<()> {
 }
 
 fn open(path: &Path) -> anyhow::Result<(fs::File, fs::Metadata)> {
+    if path == Path::new("-") && !path.exists() {
+        bail!(
+            "-: input is read from files, not from stdin: write it to a file, or give /dev/stdin where the system has it"
+        );
+    }
     if path.is_dir() {
         bail!("{}: is a folder, and one file is expected here: name the file in it", path.display());
     }

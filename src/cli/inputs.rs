@@ -205,6 +205,24 @@ pub(super) fn nominal(model: &NamedModel, stated: Option<NamedRobot<'_>>) -> any
     }
 }
 
+/// The robot whose measurements are read for a model: the stated one, or that of the catalogue which the model names.
+///
+/// # Errors
+/// An arm that is not in the catalogue: only its robot file says how its logged angles count.
+pub(super) fn measured_robot<'a>(
+    arm: &'a Estimated,
+    stated: Option<NamedRobot<'a>>,
+) -> anyhow::Result<NamedRobot<'a>> {
+    match stated {
+        Some(stated) => Ok(stated),
+        None if robots::load(&arm.robot).is_ok() => Ok(arm.robot.as_str().into()),
+        None => bail!(
+            "the robot of the model, {}, is not in the catalogue: add its robot file, --robot FILE, which says how the logged angles count",
+            arm.robot
+        ),
+    }
+}
+
 /// A path relative to the folder of another file.
 pub(super) fn beside(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name)

@@ -69,8 +69,9 @@ impl Shares {
         let bytes = if path == Path::new("-") { files::read_stdin()? } else { files::read(path)? };
         let units: Vec<Unit> = serde_json::from_slice(&bytes).map_err(|error| {
             anyhow!(
-                "{}: {error}; expected a list such as [{{\"under\": \"folder\", \"paths\": [\"folder/a.mod\"]}}]",
-                path.display()
+                "{}: {}; expected a list such as [{{\"under\": \"folder\", \"paths\": [\"folder/a.mod\"]}}]",
+                path.display(),
+                misread(&error)
             )
         })?;
         let jobs: Vec<Job> = units.iter().map(Job::of_unit).collect();
@@ -79,6 +80,16 @@ impl Shares {
         }
         Ok(Some(jobs))
     }
+}
+
+/// Where and why a list of units cannot be read, without the names of the program's own types.
+fn misread(error: &serde_json::Error) -> String {
+    let what = match error.classify() {
+        serde_json::error::Category::Data => "this is no list of units",
+        serde_json::error::Category::Eof => "the text ends too early",
+        _ => "this is not JSON",
+    };
+    format!("line {}, column {}: {what}", error.line(), error.column())
 }
 
 /// The result of a unit, with its record.

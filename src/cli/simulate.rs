@@ -1,6 +1,6 @@
 //! `truegrind simulate RECIPE.toml -o DATA.csv`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use truegrind::arm::arm_file::ArmFile;
@@ -8,6 +8,7 @@ use truegrind::arm::effect::Effect;
 use truegrind::arm::model::Model;
 use truegrind::calibration::measurement::simulation::Simulation;
 use truegrind::calibration::measurement::simulation::recipe::{Approach, Recipe};
+use truegrind::robots::foreign::Kind;
 
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
@@ -63,13 +64,23 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Ok(ExitStatus::Done)
 }
 
-/// Runs a recipe.
+/// Runs a recipe. A robot file that it names is looked up beside it first, then in the working directory.
 pub(super) fn simulation(text: &str, name: &str, seed: Option<u64>) -> anyhow::Result<Simulation> {
     let mut recipe = Recipe::parse(text, name)?;
     if let Some(seed) = seed {
         recipe.seed = seed;
     }
-    Ok(recipe.simulate(|name| inputs::robot(name).map(|r| r.model).map_err(|e| format!("{e:#}")))?)
+    let of_file = |robot: &str| {
+        let beside = inputs::beside(Path::new(name), robot);
+        if Kind::of(robot).is_some() && beside.is_file() {
+            beside.to_string_lossy().into_owned()
+        } else {
+            robot.to_owned()
+        }
+    };
+    Ok(recipe.simulate(|robot| {
+        inputs::robot(of_file(robot).as_str()).map(|r| r.model).map_err(|e| format!("{e:#}"))
+    })?)
 }
 
 /// The file of a simulated actual arm.

@@ -13,6 +13,7 @@ mod belonging;
 mod files;
 mod fits;
 mod input;
+mod json;
 mod manual;
 mod nc;
 #[cfg(feature = "visual")]

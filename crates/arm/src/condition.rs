@@ -12,7 +12,7 @@ pub struct Condition {
     pub temperature_c: Option<f64>,
     /// Mass at the flange (kg).
     pub payload_kg: Option<f64>,
-    /// Centre of the payload in the last frame of the arm (mm).
+    /// Centre of the payload in the flange frame (mm).
     pub payload_centre_mm: [f64; 3],
     /// Approach direction of each joint, in the sense of the controller's angle: −1 from below, +1 from above, 0 unknown.
     pub approach: [i8; 6],

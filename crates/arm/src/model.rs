@@ -124,7 +124,7 @@ impl Model {
     /// Statics of the rigid arm: joint effects change the torque in second order only. Massless where the masses are unknown;
     /// then only the payload counts.
     pub fn statics(&self) -> Statics {
-        Statics::new(&self.links, self.bodies, self.gravity)
+        Statics::new(&self.links, self.bodies, self.gravity, self.flange)
     }
 
     /// The links under a condition: grown by whatever effect changes lengths.

@@ -42,6 +42,6 @@ impl<'a> Arms<'a> {
             return Vec::new();
         };
         let motions = listing.motions.iter().enumerate();
-        motions.map(|(index, motion)| payload_at(loads, index, motion, listing, model)).collect()
+        motions.map(|(index, motion)| payload_at(loads, index, motion, listing)).collect()
     }
 }

@@ -186,7 +186,7 @@ fn agreed(
     planned.steps = StepsToLeft::of(program.listing(), &planned.changes, &outcome, options.tolerance_mm);
     planned.notes.extend(undeclared::notes(program.listing(), program.language()));
     let loads = options.loads.as_ref();
-    let stated = loads.and_then(|loads| stated_overload(program.listing(), loads, &arm.robot, &arm.nominal));
+    let stated = loads.and_then(|loads| stated_overload(program.listing(), loads, &arm.robot));
     let most_kg =
         stated.as_ref().map(|stated| stated.most_kg).into_iter().chain(options.condition.payload_kg);
     planned.is_overloaded = most_kg.into_iter().any(|kg| is_far_above_rating(kg, &arm.robot));

@@ -25,6 +25,8 @@ pub struct ProgramFile {
     pub file: String,
     /// The file that was written; `None` in a dry run.
     pub output: Option<String>,
+    /// Whether nothing in it was corrected: the written file is a copy, byte for byte.
+    pub unchanged: bool,
 }
 
 /// Largest number of ranges of lines listed for a reason.
@@ -170,6 +172,7 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
             json!({
                 "file": file.file,
                 "output": file.output,
+                "unchanged": file.unchanged,
                 "opaque_regions": opaque,
                 "motions": motions,
             })

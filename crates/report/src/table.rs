@@ -89,6 +89,13 @@ pub enum Cell {
         /// Its 1σ.
         sigma: f64,
     },
+    /// A number that pages show in words: a p-value too small for its digits.
+    Worded {
+        /// The value, for data files.
+        value: f64,
+        /// What pages show.
+        shown: String,
+    },
     /// A status with a text.
     Judged(Status, String),
     /// Missing: printed as `–`, empty in CSV, `null` in JSON.
@@ -290,6 +297,7 @@ impl Cell {
         match self {
             Cell::Text(text) => text.clone(),
             Cell::Number(value) => precision.format(*value),
+            Cell::Worded { shown, .. } => shown.clone(),
             Cell::Count(count) => count.to_string(),
             Cell::WithSigma { value, .. } if value.is_nan() => MISSING.to_owned(),
             Cell::WithSigma { value, sigma } => precision.format_with_sigma(*value, *sigma),

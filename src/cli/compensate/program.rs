@@ -79,9 +79,11 @@ pub(super) fn rewrite_program(
     let files: Vec<ProgramFile> = names
         .iter()
         .zip(targets)
-        .map(|(name, target)| ProgramFile {
+        .zip(&rewritten.files)
+        .map(|((name, target), rewritten)| ProgramFile {
             file: name.clone(),
             output: target.as_ref().map(|t| t.display().to_string()),
+            unchanged: rewritten.edits.is_empty(),
         })
         .collect();
     let outputs: Vec<&str> = files.iter().filter_map(|file| file.output.as_deref()).collect();

@@ -225,3 +225,91 @@ fn an_arm_of_the_catalogue_is_written_as_a_file() {
     let (code, _, err) = truegrind(at, &["robots", "mine.toml", "-o", "mine.toml"]);
     assert!(code == 2 && err.contains("mine.toml"), "{err}");
 }
+
+/// A robot file with a `[robot.flange]` of its own is the same arm under the same load, and a recipe finds its robot file beside itself.
+#[test]
+fn a_load_is_stated_in_the_flange_frame_of_every_robot_file() {
+    let dir = folder();
+    let at = dir.path();
+    fs::create_dir(at.join("arms")).unwrap();
+    let (code, _, err) = truegrind(at, &["robots", "abb-irb-120", "-o", "arms/plain.toml"]);
+    assert_eq!(code, 0, "{err}");
+    let plain = fs::read_to_string(at.join("arms/plain.toml")).unwrap();
+    // The last link ends turned by 90° about x, and the flange turns back.
+    let (before, last) = plain.split_at(plain.rfind("[[robot.link]]").unwrap());
+    let turned = last
+        .replacen("alpha_deg = 0.0", "alpha_deg = 90.0", 1)
+        .replacen("[robot.joints]", "[robot.flange]\nposition_mm = [0.0, 0.0, 0.0]\nquaternion_wxyz = [0.7071067811865476, -0.7071067811865476, 0.0, 0.0]\n\n[robot.joints]", 1);
+    assert!(turned.contains("alpha_deg = 90.0") && turned.contains("[robot.flange]"));
+    fs::write(at.join("arms/turned.toml"), format!("{before}{turned}")).unwrap();
+    let readings = |robot: &str, loads: &str| -> Vec<f64> {
+        let recipe = format!(
+            "robot = \"{robot}\"\nseed = 1\n[[arm.effect]]\neffect = \"joint-compliance\"\njoint = 1\ncompliance_rad_per_nm = 1e-4\n\
+             [poses]\nkind = \"list\"\njoints_deg = [[10.0, 20.0, -30.0, 40.0, 50.0, 60.0], [0.0, 30.0, 10.0, 90.0, 80.0, 0.0]]\n\
+             [circumstances]\n{loads}\n[sensor]\nkind = \"position\"\nframe = {{ position_mm = [0.0, 0.0, 0.0], wxyz = [1.0, 0.0, 0.0, \
+             0.0] }}\nreflector_mm = [0.0, 0.0, 0.0]\n[noise]\nsigma_mm = 0.0\n"
+        );
+        fs::write(at.join("arms/recipe.toml"), recipe).unwrap();
+        let (code, out, err) = truegrind(at, &["simulate", "arms/recipe.toml", "-o", "-"]);
+        assert_eq!(code, 0, "{err}");
+        let measured = |line: &str| -> Vec<f64> {
+            line.split(',').skip(6).take(3).map(|c| c.parse().unwrap()).collect()
+        };
+        assert!(out.lines().next().unwrap().split(',').nth(6) == Some("measured_x"), "{out}");
+        out.lines().skip(1).flat_map(measured).collect()
+    };
+    let load = "payload_kg = [3.0]\npayload_centre_mm = [0.0, 0.0, 100.0]";
+    let (one, other) = (readings("plain.toml", load), readings("turned.toml", load));
+    let without = readings("plain.toml", "payload_kg = [0.0]");
+    let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    // The masses of the link itself were not turned with its frame: less than a micrometre.
+    assert!(apart(&one, &other) < 2e-3, "{one:?} {other:?}");
+    assert!(apart(&one, &without) > 0.1, "{one:?} {without:?}");
+}
+
+/// A URDF of an arm on a wall, and a model of an arm that is not in the catalogue.
+#[test]
+fn how_an_arm_is_mounted_is_told() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("cell.urdf"), TWO).unwrap();
+    let links = ["--base", "right_base_link", "--tip", "right_tool0", "-o", "right.toml"];
+    let (code, out, err) = truegrind(at, &[&["robots", "--check", "cell.urdf"][..], &links].concat());
+    let words = out.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        code == 0 && words.contains("mounting: the arm is on a wall (gravity points along "),
+        "{out}{err}"
+    );
+    let written = fs::read_to_string(at.join("right.toml")).unwrap();
+    let gravity = written.lines().find(|line| line.starts_with("gravity = ")).unwrap();
+    assert!(!gravity.contains("[0.0, 0.0, -1.0]"), "{gravity}");
+}
+
+#[test]
+fn what_else_a_robot_of_ones_own_needs_is_said() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), CABLE).unwrap();
+    let (code, _, err) = truegrind(at, &["robots", "abb-irb-120", "-o", "catalogue.toml"]);
+    assert_eq!(code, 0, "{err}");
+    let own =
+        fs::read_to_string(at.join("catalogue.toml")).unwrap().replacen("\"abb-irb-120\"", "\"mine\"", 1);
+    fs::write(at.join("mine.toml"), own).unwrap();
+    let identify = ["identify", "data.csv", "--robot", "mine.toml", "-o", "m.toml", "--allow-doubtful"];
+    let (code, _, err) = truegrind(at, &identify);
+    assert!(code < 2, "{err}");
+    let export = ["export", "m.toml", "--to", "dh-csv", "-o", "-", "--data", "data.csv"];
+    let accept =
+        ["accept", "data.csv", "--model", "m.toml", "--tolerance", "1", "--sensor-uncertainty", "0.02"];
+    for run in [&export[..], &accept] {
+        let (code, _, err) = truegrind(at, run);
+        assert!(
+            code == 2 && err.contains("mine, is not in the catalogue") && err.contains("--robot FILE"),
+            "{err}"
+        );
+    }
+    let (code, _, err) = truegrind(at, &[&export[..], &["--robot", "mine.toml"]].concat());
+    assert!(code < 2, "{err}");
+    let (code, _, err) = truegrind(at, &["identify", "-", "--robot", "abb-irb-120"]);
+    assert!(code == 2 && err.contains("read from files, not from stdin"), "{err}");
+}

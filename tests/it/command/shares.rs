@@ -369,6 +369,10 @@ fn what_is_missing_is_listed_by_share_and_name() {
     fs::write(at.join("some.json"), list).unwrap();
     let (code, out, err) = truegrind(at, &with(&COMPENSATE, &["--units", "some.json", "--resume"]));
     assert!(code < 2 && out.contains("2 programs"), "{out}{err}");
+    fs::write(at.join("names.json"), r#"["in/straight.mod"]"#).unwrap();
+    let (code, _, err) = truegrind(at, &with(&COMPENSATE, &["--units", "names.json"]));
+    assert!(code == 2 && err.contains("line 1, column ") && err.contains("no list of units"), "{err}");
+    assert!(!err.contains("struct"), "{err}");
 }
 
 #[cfg(unix)]

@@ -1,6 +1,6 @@
 //! The static torques of an arm, for effects that need them.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 
 use crate::body::Body;
 use crate::chain::{self, Chain, LinkTable, cross, dot, minus};
@@ -8,6 +8,7 @@ use crate::condition::Condition;
 use crate::joints::MappedJoints;
 use crate::link::Link;
 use truegrind_math::lanes::{SinCos, sin_cos, splats};
+use truegrind_math::se3::Pose;
 
 /// The static torques of an arm, for effects that need them.
 #[derive(Debug, Clone)]
@@ -15,6 +16,8 @@ pub struct Statics {
     tables: [LinkTable; 6],
     bodies: [Body; 6],
     gravity: Vector3<f64>,
+    /// The flange in the last frame.
+    flange: Pose,
 }
 
 /// Standard gravity [m/s²].
@@ -22,10 +25,16 @@ pub(super) const GRAVITY: f64 = 9.806_65;
 
 impl Statics {
     /// Statics of links without joint effects (their share in the torque is of second order), massless where the masses
-    /// of the links are unknown (only the payload then counts). `gravity`: its direction in the base.
-    pub(crate) fn new(links: &[Link; 6], bodies: Option<[Body; 6]>, gravity: Vector3<f64>) -> Self {
+    /// of the links are unknown (only the payload then counts). `gravity`: its direction in the base; `flange`: its pose in
+    /// the last frame.
+    pub(crate) fn new(
+        links: &[Link; 6],
+        bodies: Option<[Body; 6]>,
+        gravity: Vector3<f64>,
+        flange: Pose,
+    ) -> Self {
         let bodies = bodies.unwrap_or([Body { mass_kg: 0.0, centre_mm: [0.0; 3] }; 6]);
-        Self { tables: chain::tables(links), bodies, gravity }
+        Self { tables: chain::tables(links), bodies, gravity, flange }
     }
 
     /// Torque of gravity about each joint axis (N m) at mapped angles `u`, and its derivative ∂τⱼ/∂uᵢ, which is
@@ -100,15 +109,16 @@ impl Statics {
         let frames = self.frames(u);
         let mut levers = [[zero; 3]; 6];
         let (mut sum, mut mass) = ([zero; 3], 0.0);
+        let payload_centre = self.flange * Point3::from(condition.payload_centre_mm);
         for k in (0..6).rev() {
             let (y, z, o) = (&frames.y[k], &frames.z[k + 1], &frames.origin[k + 1]);
             let x = cross(y, z);
             let body = &self.bodies[k];
             let payload = if k == 5 { condition.payload_kg.unwrap_or(0.0) } else { 0.0 };
-            // Σ m c of the body, and of the payload, which has its centre in the same frame.
+            // Σ m c of the body, and of the payload, both in the frame of the link.
             let mut c = [0.0; 3];
             for i in 0..3 {
-                c[i] = body.mass_kg * body.centre_mm[i] + payload * condition.payload_centre_mm[i];
+                c[i] = body.mass_kg * body.centre_mm[i] + payload * payload_centre[i];
             }
             let here = body.mass_kg + payload;
             mass += here;

@@ -285,11 +285,23 @@ fn frame(frames: &crate::chain::Chain<f64>, link: usize) -> Pose {
 }
 
 fn metres(v: &Vector3<f64>) -> String {
-    format!("{} {} {}", v.x / 1000.0, v.y / 1000.0, v.z / 1000.0)
+    let [x, y, z] = <[f64; 3]>::from(v / 1000.0).map(without_noise);
+    format!("{x} {y} {z}")
+}
+
+/// Roll, pitch and yaw (rad).
+fn angles(pose: &Pose) -> [f64; 3] {
+    let (roll, pitch, yaw) = pose.rotation.euler_angles();
+    [roll, pitch, yaw].map(without_noise)
+}
+
+/// Rounding noise of a length (m) or an angle (rad) as zero: a femtometre at one metre.
+fn without_noise(value: f64) -> f64 {
+    if value.abs() < 1e-15 { 0.0 } else { value }
 }
 
 fn origin(pose: &Pose) -> String {
-    let (roll, pitch, yaw) = pose.rotation.euler_angles();
+    let [roll, pitch, yaw] = angles(pose);
     format!("xyz=\"{}\" rpy=\"{roll} {pitch} {yaw}\"", metres(&pose.translation.vector))
 }
 
@@ -304,12 +316,11 @@ fn ur_yaml(model: &Model, notes: &[String]) -> String {
     // The last frame turns about its own z, along which it may stand anywhere.
     poses[5] *= Pose::translation(0.0, 0.0, model.links[5].d_mm);
     for (name, pose) in UR.iter().zip(&poses) {
-        let place = pose.translation.vector / 1000.0;
-        let (roll, pitch, yaw) = pose.rotation.euler_angles();
+        let [x, y, z] = <[f64; 3]>::from(pose.translation.vector / 1000.0).map(without_noise);
+        let [roll, pitch, yaw] = angles(pose);
         let _ = writeln!(
             out,
-            "  {name}:\n    x: {}\n    y: {}\n    z: {}\n    roll: {roll}\n    pitch: {pitch}\n    yaw: {yaw}",
-            place.x, place.y, place.z
+            "  {name}:\n    x: {x}\n    y: {y}\n    z: {z}\n    roll: {roll}\n    pitch: {pitch}\n    yaw: {yaw}",
         );
     }
     out

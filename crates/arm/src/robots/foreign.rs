@@ -178,7 +178,7 @@ fn robot(
         }
     }
     let inside = fitted.base.inverse();
-    let gravity = inside.rotation * Vector3::new(0.0, 0.0, -1.0);
+    let gravity = inside.rotation * foreign.gravity;
     let plain = map == Matrix6::identity();
     let place = fitted.base.translation.vector;
     let sheet = DataSheet {
@@ -235,7 +235,10 @@ fn limit_against_ground(limits_deg: &mut [[f64; 2]; 6], along: f64) -> SumLimit 
 
 fn flange_sheet(flange: &Pose) -> FlangeSheet {
     let q = flange.rotation;
-    FlangeSheet { position_mm: flange.translation.vector.into(), quaternion_wxyz: [q.w, q.i, q.j, q.k] }
+    FlangeSheet {
+        position_mm: flange.translation.vector.map(zero_if_tiny).into(),
+        quaternion_wxyz: [q.w, q.i, q.j, q.k].map(zero_if_tiny),
+    }
 }
 
 /// Masses of the links, with their centres in the frames of our links.
@@ -340,8 +343,28 @@ fn summarise(robot: &Robot, notes: &[String]) -> Vec<String> {
     if !coupled.is_empty() {
         out.push(coupled.join("; "));
     }
+    out.push(mounted(&robot.sheet.mounting));
     out.extend(notes.iter().cloned());
     out
+}
+
+/// How the arm is mounted, in words.
+fn mounted(mounting: &Mounting) -> String {
+    let down = Vector3::from(mounting.gravity).normalize();
+    let along = direction(&down);
+    let how = match along.as_str() {
+        "−z" => "the arm stands",
+        "+z" => "the arm hangs",
+        "+x" | "−x" | "+y" | "−y" => "the arm is on a wall",
+        _ => "the arm is tilted",
+    };
+    // No sign before zero.
+    let [x, y, z] = mounting.plate_mm.map(|mm| (mm * 1e3).round() / 1e3 + 0.0);
+    let face = match [x, y, z] {
+        [0.0, 0.0, 0.0] => "at the origin of the base".to_owned(),
+        _ => format!("at ({x:.3}, {y:.3}, {z:.3}) mm in the base"),
+    };
+    format!("mounting: {how} (gravity points along {along} of the base); its mounting face is {face}")
 }
 
 /// A direction in words.

@@ -1,11 +1,12 @@
 //! Tests of the effects: slopes, torques, and that each does what its name says.
 
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::{Matrix6, Point3, Vector3};
 use truegrind_arm::chain::tables;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::bending::Bending;
+use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::model::{Joints, MappedJoints, Model, PreparedModel};
 use truegrind_math::difference::jacobian;
@@ -335,4 +336,35 @@ fn play_lags_in_the_sense_of_the_controller() {
         }
     }
     assert!(truegrind_arm::robots::load("fanuc-lr-mate-200id").unwrap().model.is_coupled(2));
+}
+
+/// One arm with its flange turned and moved against its last link, and the same arm whose last link ends in the flange: under one load on
+/// the flange they sink alike.
+#[test]
+fn a_load_lies_in_the_flange_frame_however_the_last_link_ends() {
+    let mut plain = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
+    plain.effects = vec![Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: 1e-4 })];
+    let mut described = plain.clone();
+    // Tx(a) Rx(alpha) after the flange of `plain` is its last link; the flange leads back.
+    described.links[5].a_mm = 40.0;
+    described.links[5].alpha_rad = 1.2;
+    let ends = plain.links[5].pose(0.0).inverse() * described.links[5].pose(0.0);
+    described.flange = ends.inverse();
+    for body in described.bodies.iter_mut().map(|bodies| &mut bodies[5]) {
+        body.centre_mm = (described.flange * Point3::from(body.centre_mm)).coords.into();
+    }
+    let mut random = generator(48);
+    for condition in [
+        condition(),
+        Condition { payload_kg: Some(3.0), payload_centre_mm: [0.0; 3], ..Condition::default() },
+    ] {
+        for _ in 0..10 {
+            let q = joints_within(&plain, &mut random);
+            let (one, other) = (plain.forward(&q, &condition), described.forward(&q, &condition));
+            let apart = (one.translation.vector - other.translation.vector).norm();
+            assert!(apart < 1e-9 && one.rotation.angle_to(&other.rotation) < 1e-9, "{apart} mm");
+            let sunk = plain.forward(&q, &Condition::default()).translation.vector - one.translation.vector;
+            assert!(sunk.norm() > 1e-3, "{sunk}");
+        }
+    }
 }

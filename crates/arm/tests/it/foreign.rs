@@ -173,6 +173,19 @@ fn of_two_arms_in_one_file_one_has_to_be_named() {
     // Mounted on its side: gravity is not along the axis of joint 1.
     let right = read(TWO, "cell.urdf", &only_tip("table", "right_tool0")).robot;
     assert!((right.model.gravity.norm() - 1.0).abs() < 1e-12 && right.model.gravity.z.abs() < 1e-9);
+    // So it is with its own base: what it is mounted on is above that in the tree.
+    let own = read(TWO, "cell.urdf", &only_tip("right_base_link", "right_tool0"));
+    assert!((own.robot.model.gravity.norm() - 1.0).abs() < 1e-12 && own.robot.model.gravity.z.abs() < 1e-9);
+    let told = own.summary.join("\n");
+    assert!(told.contains("mounting: the arm is on a wall (gravity points along "), "{told}");
+    assert!(told.contains("gravity points along −z of link table, the root of the tree"), "{told}");
+    let left = read(TWO, "cell.urdf", &only_tip("left_base_link", "left_tool0")).summary.join("\n");
+    assert!(
+        left.contains(
+            "mounting: the arm stands (gravity points along −z of the base); its mounting face is at the origin"
+        ),
+        "{left}"
+    );
     refused(
         TWO,
         "cell.urdf",
@@ -284,7 +297,10 @@ fn what_is_no_urdf_of_an_arm_is_refused_in_words() {
             &["joint_2", "that of joint joint_1 already"],
         ),
         (replaced("<parent link=\"world\"/>", "<parent link=\"tool0\"/>"), &["no link without a parent"]),
-        (replaced("0 0 0.29", "0 0 290"), &["link", "a finite length in mm"]),
+        (
+            replaced("0 0 0.29", "0 0 290"),
+            &["joint joint_1, <origin xyz>: found `0 0 290`", "metres, within ±10"],
+        ),
         (String::new(), &["XML"]),
         ("<!DOCTYPE a [<!ENTITY b \"c\">]><robot name=\"&b;\"/>".to_owned(), &["XML"]),
     ] {
@@ -689,4 +705,69 @@ fn no_damage_brings_the_readers_down() {
         }
     }
     assert!(read_whole > 100, "{read_whole}");
+}
+
+/// Wrong units and slips of a URDF are told by line and name, with the numbers of the file.
+#[test]
+fn faults_of_a_urdf_are_told_by_line_and_joint() {
+    let link = |name: &str| format!("<link name=\"{name}\"/>\n");
+    let links = ["base", "l1", "l2", "l3", "l4", "l5", "tool0"].map(link).concat();
+    let joint = |index: usize, parent: &str, child: &str, xyz: &str| {
+        let axis = ["0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0"][index];
+        format!(
+            "<joint name=\"j{}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"{xyz}\"/>\
+             <axis xyz=\"{axis}\"/><limit lower=\"-2.5\" upper=\"2.5\"/></joint>\n",
+            index + 1
+        )
+    };
+    let joints = [
+        joint(0, "base", "l1", "0 0 0.29"),
+        joint(1, "l1", "l2", "0 0 0"),
+        joint(2, "l2", "l3", "0 0 0.27"),
+        joint(3, "l3", "l4", "0 0 0.07"),
+        joint(4, "l4", "l5", "0.302 0 0"),
+        joint(5, "l5", "tool0", "0.072 0 0"),
+    ]
+    .concat();
+    let sound = format!("<robot name=\"arm\">\n{links}{joints}</robot>\n");
+    let none = ImportOptions::default();
+    read(&sound, "a.urdf", &none);
+    let fault = |from: &str, to: &str, words: &[&str]| {
+        assert!(sound.contains(from));
+        refused(&sound.replacen(from, to, 1), "a.urdf", &none, words);
+    };
+    fault(
+        "0 0 0.27",
+        "0 0 270",
+        &["line 11, joint j3, <origin xyz>: found `0 0 270`", "metres", "millimetres"],
+    );
+    fault(
+        "lower=\"-2.5\" upper=\"2.5\"",
+        "lower=\"-165\" upper=\"165\"",
+        &["line 9, joint j1, <limit>: found lower -165 and upper 165", "radians", "degrees"],
+    );
+    fault(
+        "lower=\"-2.5\" upper=\"2.5\"",
+        "lower=\"2\" upper=\"-2.5\"",
+        &["line 9, joint j1, <limit>: found lower 2 and upper -2.5", "lower below upper"],
+    );
+    let heavy = "<link name=\"l2\"><inertial><mass value=\"-3.2\"/></inertial></link>";
+    fault("<link name=\"l2\"/>", heavy, &["line 4, link l2, <mass>: found -3.2", "0 or more"]);
+    fault(
+        "<link name=\"l2\"/>",
+        "<link name=\"l2\"/><link name=\"l1\"/>",
+        &["line 4, link l1", "second link"],
+    );
+}
+
+/// A table whose metres are millimetres, and a kinematics file that is written in short.
+#[test]
+fn millimetres_under_metres_and_short_yaml_are_told() {
+    let table = "convention,alpha_deg,a_m,theta_deg,d_m\nstandard,-90,0,0,290\nstandard,0,270,-90,0\n\
+                 standard,-90,70,0,0\nstandard,90,0,0,302\nstandard,-90,0,0,0\nstandard,0,0,180,72\n";
+    let words = ["column d_m: found [290.0, 0.0, 0.0, 302.0, 0.0, 72.0]", "these look like millimetres"];
+    refused(table, "t.csv", &ImportOptions::default(), &words);
+    let yaml = "kinematics:\n  shoulder: {x: 0, y: 0, z: 0.1, roll: 0, pitch: 0, yaw: 0}\n";
+    let words = ["line 2, kinematics.shoulder", "each in a line of its own"];
+    refused(yaml, "u.yaml", &ImportOptions::default(), &words);
 }

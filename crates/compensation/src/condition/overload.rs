@@ -2,7 +2,6 @@
 
 use super::payload::payload_at;
 use crate::line_list::lines_of;
-use truegrind_arm::model::Model;
 use truegrind_arm::robots;
 use truegrind_programs::motion::Listing;
 use truegrind_programs::motion::load::Loads;
@@ -43,11 +42,10 @@ pub struct StatedOverload {
 }
 
 /// See [`StatedOverload`].
-pub fn stated_overload(listing: &Listing, loads: &Loads, robot: &str, arm: &Model) -> Option<StatedOverload> {
+pub fn stated_overload(listing: &Listing, loads: &Loads, robot: &str) -> Option<StatedOverload> {
     let rated_kg = rated_payload_kg(robot)?;
     let mass_kg = |index: usize| {
-        Some(payload_at(loads, index, &listing.motions[index], listing, arm)?.mass_kg)
-            .filter(|kg| *kg > rated_kg)
+        Some(payload_at(loads, index, &listing.motions[index], listing)?.mass_kg).filter(|kg| *kg > rated_kg)
     };
     let masses: Vec<(u32, f64)> =
         (0..listing.motions.len()).filter_map(|index| Some((index as u32, mass_kg(index)?))).collect();

@@ -1,33 +1,25 @@
-//! Payload at each motion: the tool's own load (`tload`) and what the program states that it grips, in the arm's last frame.
+//! Payload at each motion: the tool's own load (`tload`) and what the program states that it grips, on the flange.
 
 use nalgebra::Point3;
 
 use truegrind_arm::effect::Effect;
-use truegrind_arm::model::Model;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::load::{Grip, Load, Loads};
 use truegrind_programs::motion::{Listing, Motion, ToolValue, WorkObjectValue};
 
-/// Payload at motion `index`, its centre in the last frame of `arm` (mm); `None` where the program does not state it. With an
+/// Payload at motion `index`, its centre in the flange frame (mm); `None` where the program does not state it. With an
 /// unknown gripped load only the tool counts.
-pub fn payload_at(
-    loads: &Loads,
-    index: usize,
-    motion: &Motion,
-    listing: &Listing,
-    arm: &Model,
-) -> Option<Load> {
-    let in_last = |centre: Point3<f64>| -> [f64; 3] { (arm.flange * centre).coords.into() };
+pub fn payload_at(loads: &Loads, index: usize, motion: &Motion, listing: &Listing) -> Option<Load> {
     if let Some(total) = loads.totals.get(&index) {
-        return Some(Load { centre_mm: in_last(total.centre_mm.into()), ..*total });
+        return Some(*total);
     }
     let tool: &ToolValue = listing.tool(motion)?.value.as_ref().ok()?;
-    let own = (tool.mass_kg > 0.0)
-        .then(|| Load { mass_kg: tool.mass_kg, centre_mm: in_last(tool.centre_of_gravity_mm.into()) });
+    let own =
+        (tool.mass_kg > 0.0).then(|| Load { mass_kg: tool.mass_kg, centre_mm: tool.centre_of_gravity_mm });
     let Grip::Holds(held) = loads.grip(index) else { return own };
     let object: &WorkObjectValue = listing.work_object(motion)?.value.as_ref().ok()?;
     let frame: Pose = if tool.robhold { tool.frame.pose() } else { object.user_frame.pose() };
-    let held = Load { centre_mm: in_last(frame * Point3::from(held.centre_mm)), ..held };
+    let held = Load { centre_mm: (frame * Point3::from(held.centre_mm)).coords.into(), ..held };
     Some(match own {
         Some(own) => together(&own, &held),
         None => held,

@@ -169,10 +169,9 @@ impl<'a> Teaching<'a> {
     fn loaded_with(&self, load: Option<Load>) -> Option<PreparedModel<'a>> {
         let load = load.filter(|_| self.own_loads)?;
         let model = self.estimated.model;
-        let centre = model.flange * Point3::from(load.centre_mm);
         let condition = Condition {
             payload_kg: Some(load.mass_kg),
-            payload_centre_mm: centre.coords.into(),
+            payload_centre_mm: load.centre_mm,
             ..self.estimated.condition
         };
         model.effects.iter().any(is_load_dependent).then(|| model.at_condition(&condition))

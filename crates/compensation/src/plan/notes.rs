@@ -312,7 +312,7 @@ pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) 
     let mut out = Vec::new();
     let motions =
         || listing.motions.iter().enumerate().filter(|(_, m)| m.own_reason.is_none() && m.tool.is_some());
-    let at = |(index, motion): (usize, &Motion)| payload_at(loads, index, motion, listing, model);
+    let at = |(index, motion): (usize, &Motion)| payload_at(loads, index, motion, listing);
     let stated: Vec<f64> = motions().filter_map(at).map(|load| load.mass_kg).collect();
     let silent = motions().count() - stated.len();
     let base = options.condition.payload_kg.map_or("no payload".to_owned(), |kg| format!("{} kg", grams(kg)));

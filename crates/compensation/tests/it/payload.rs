@@ -24,10 +24,9 @@ fn grips(body: &str) -> (Task<'static>, Loads) {
 
 fn masses(body: &str) -> Vec<Option<f64>> {
     let (task, loads) = grips(body);
-    let arm = super::nominal();
     let listing = &task.listing;
     (0..listing.motions.len())
-        .map(|k| payload_at(&loads, k, &listing.motions[k], listing, &arm).map(|load: Load| load.mass_kg))
+        .map(|k| payload_at(&loads, k, &listing.motions[k], listing).map(|load: Load| load.mass_kg))
         .collect()
 }
 
@@ -62,8 +61,7 @@ fn a_grip_is_followed_through_statements_branches_loops_and_calls() {
 fn loads_add_up_at_their_common_centre_and_tload_stands_for_both() {
     let (task, loads) = grips("PROC main()\n GripLoad part;\n m;\nENDPROC\n");
     let listing = &task.listing;
-    let arm = super::nominal();
-    let load = payload_at(&loads, 0, &listing.motions[0], listing, &arm).unwrap();
+    let load = payload_at(&loads, 0, &listing.motions[0], listing).unwrap();
     // 2 kg at 50 mm and 3 kg at 20 mm beyond the TCP at 100 mm.
     assert!((load.centre_mm[2] - (2.0 * 50.0 + 3.0 * 120.0) / 5.0).abs() < 1e-9, "{load:?}");
     let body = "PROC main()\n GripLoad part;\n MoveL TARGET,v100,fine,t\\TLoad:=part;\n \
@@ -73,7 +71,7 @@ fn loads_add_up_at_their_common_centre_and_tload_stands_for_both() {
     let text = "MODULE M\n PERS tooldata u := [TRUE,[[0,0,1],[1,0,0,0]],[-1,[0,0,0],[1,0,0,0],0,0,0]];\n PROC main()\n \
                 MoveL [[400,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,u;\n ENDPROC\nENDMODULE\n";
     let task = Task::read(&[("p.mod", text.as_bytes())]);
-    assert_eq!(payload_at(&Loads::default(), 0, &task.listing.motions[0], &task.listing, &arm), None);
+    assert_eq!(payload_at(&Loads::default(), 0, &task.listing.motions[0], &task.listing), None);
 }
 
 #[test]
@@ -127,7 +125,7 @@ fn what_a_computed_name_or_an_interrupt_begins_with_is_not_known() {
 fn masses_above_the_rated_payload_are_told_with_the_unit_that_fits() {
     let told = |body: &str, robot: &str| {
         let (task, loads) = grips(body);
-        stated_overload(&task.listing, &loads, robot, &super::nominal()).map(|stated| stated.note)
+        stated_overload(&task.listing, &loads, robot).map(|stated| stated.note)
     };
     let both = "PROC main()\n m;\n GripLoad part;\n m;\n GripLoad load0;\n m;\nENDPROC\n";
     let note = told(both, "abb-irb-120").unwrap();

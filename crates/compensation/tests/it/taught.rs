@@ -519,9 +519,10 @@ fn a_frame_is_re_evaluated_under_the_load_of_the_tool_that_touched() {
     scene.actual.effects = vec![spring(1), spring(2)];
     let measured = Condition { payload_kg: Some(1.0), ..Condition::default() };
     // As the data of the two tools say: 12 kg, and 1 kg at 50 mm.
-    let under = |mass_kg: f64, z: f64| {
-        let centre = scene.actual.flange * Point3::new(0.0, 0.0, z);
-        Condition { payload_kg: Some(mass_kg), payload_centre_mm: centre.coords.into(), ..measured }
+    let under = |mass_kg: f64, z: f64| Condition {
+        payload_kg: Some(mass_kg),
+        payload_centre_mm: [0.0, 0.0, z],
+        ..measured
     };
     let sheet = nominal();
     let touching: Vec<Joints> = [[-30.0, 0.0], [60.0, 0.0], [0.0, 70.0]]

@@ -124,9 +124,9 @@ pub(super) fn sessions(finding: &Finding) -> Table {
     )
 }
 
-/// A p-value; an underflowing one is stated as a bound.
+/// A p-value; pages state an underflowing one as a bound.
 fn p_value(p: f64) -> Cell {
-    if p < 1e-300 { "< 1e-300".into() } else { p.into() }
+    if p < 1e-300 { Cell::Worded { value: p, shown: "< 1e-300".to_owned() } } else { p.into() }
 }
 
 pub(super) fn parameters(finding: &Finding) -> Table {

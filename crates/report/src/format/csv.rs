@@ -51,7 +51,7 @@ pub fn table(table: &Table) -> String {
 fn value(cell: &Cell) -> String {
     match cell {
         Cell::Text(text) => words(text),
-        Cell::Number(value) | Cell::WithSigma { value, .. } => number(*value),
+        Cell::Number(value) | Cell::Worded { value, .. } | Cell::WithSigma { value, .. } => number(*value),
         Cell::Count(count) => count.to_string(),
         Cell::Judged(status, text) if text.is_empty() => status.word().to_owned(),
         Cell::Judged(_, text) => words(text),

@@ -96,7 +96,7 @@ impl Serialize for Row<'_> {
             let cell = self.table.cell(self.row, column);
             match cell {
                 Cell::Text(text) => object.serialize_entry(&field.key, text)?,
-                Cell::Number(value) | Cell::WithSigma { value, .. } => {
+                Cell::Number(value) | Cell::Worded { value, .. } | Cell::WithSigma { value, .. } => {
                     object.serialize_entry(&field.key, &finite(*value))?;
                 }
                 Cell::Count(count) => object.serialize_entry(&field.key, count)?,

@@ -112,7 +112,7 @@ fn text(cell: &Cell) -> Option<String> {
         Cell::Judged(status, value) if value.is_empty() => Some(status.word().to_owned()),
         Cell::Judged(_, value) => Some(value.clone()),
         Cell::Count(count) => Some(count.to_string()),
-        Cell::Number(value) | Cell::WithSigma { value, .. } => {
+        Cell::Number(value) | Cell::Worded { value, .. } | Cell::WithSigma { value, .. } => {
             (!value.is_nan()).then(|| crate::number::exact(*value))
         }
         Cell::Missing => None,
@@ -132,7 +132,7 @@ fn number(cell: &Cell, of_sigma: bool) -> Option<f64> {
     let value = match cell {
         Cell::WithSigma { sigma, .. } if of_sigma => *sigma,
         _ if of_sigma => return None,
-        Cell::Number(value) | Cell::WithSigma { value, .. } => *value,
+        Cell::Number(value) | Cell::Worded { value, .. } | Cell::WithSigma { value, .. } => *value,
         Cell::Count(count) => *count as f64,
         _ => return None,
     };

@@ -81,8 +81,12 @@ fn example() -> (Plan, Listing, Vec<ProgramFile>) {
         ..Plan::default()
     };
     let files = vec![
-        ProgramFile { file: "grind.mod".to_owned(), output: Some("out/grind.mod".to_owned()) },
-        ProgramFile { file: "other.mod".to_owned(), output: None },
+        ProgramFile {
+            file: "grind.mod".to_owned(),
+            output: Some("out/grind.mod".to_owned()),
+            unchanged: false,
+        },
+        ProgramFile { file: "other.mod".to_owned(), output: None, unchanged: true },
     ];
     (plan, task.listing, files)
 }
@@ -105,7 +109,10 @@ fn the_json_is_the_contract_field_by_field() {
     let programs = json["programs"].as_array().unwrap();
     assert_eq!(programs.len(), 2);
     for program in programs {
-        assert_eq!(keys(program), BTreeSet::from(["file", "output", "opaque_regions", "motions"]));
+        assert_eq!(
+            keys(program),
+            BTreeSet::from(["file", "output", "unchanged", "opaque_regions", "motions"])
+        );
         for region in program["opaque_regions"].as_array().unwrap() {
             assert_eq!(keys(region), BTreeSet::from(["line", "reason"]));
         }
@@ -129,6 +136,7 @@ fn the_json_is_the_contract_field_by_field() {
     assert_eq!(programs[0]["file"], "grind.mod");
     assert_eq!(programs[0]["output"], "out/grind.mod");
     assert!(programs[1]["output"].is_null(), "nothing was written");
+    assert_eq!((&programs[0]["unchanged"], &programs[1]["unchanged"]), (&false.into(), &true.into()));
     assert_eq!(programs[0]["motions"].as_array().unwrap().len(), 6);
     assert_eq!(programs[1]["motions"].as_array().unwrap().len(), 1);
     assert_eq!(programs[1]["motions"][0]["line"], 3);
@@ -480,7 +488,7 @@ fn before_and_after_are_stated_of_the_same_motions() {
     };
     let placements = vec![placement("wobj0", Placement::Absolute), placement("wS", Placement::Shape)];
     let mut plan = Plan { outcomes, placements, ..Plan::default() };
-    let files = [ProgramFile { file: "m.mod".to_owned(), output: None }];
+    let files = [ProgramFile { file: "m.mod".to_owned(), output: None, unchanged: false }];
     let said = |plan: &Plan| terminal::document(&view::summary(plan, &listing, &files), 400);
     let text = said(&plan);
     assert!(

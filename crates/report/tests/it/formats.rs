@@ -460,3 +460,15 @@ fn the_note_of_a_key_figure_stays_within_the_terminal() {
     assert!(text.contains("\n                           measured region\n"), "{text}");
     assert!(text.ends_with("After            0.050 mm\n"), "{text}");
 }
+
+/// A p-value too small for its digits is a number to programs and a bound to people.
+#[test]
+fn a_number_that_pages_show_in_words_is_a_number_in_data() {
+    let mut table = Table::new("", vec![Column::significant("p_value", "p", "", 2)]);
+    table.push([Cell::Worded { value: 0.0, shown: "< 1e-300".to_owned() }]);
+    assert_eq!(csv::table(&table), "p_value\r\n0\r\n");
+    let rows: serde_json::Value =
+        serde_json::from_str(&serde_json::to_string(&json::Rows(&table)).unwrap()).unwrap();
+    assert_eq!(rows, serde_json::json!([{"p_value": 0.0}]));
+    assert!(terminal::table(&table, 80).contains("< 1e-300"));
+}

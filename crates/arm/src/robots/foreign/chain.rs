@@ -23,6 +23,8 @@ pub(super) struct ForeignArm {
     pub(super) steps: [Step; 6],
     /// From the sixth joint's frame to the flange.
     pub(super) after: Pose,
+    /// Direction of gravity in the file's base.
+    pub(super) gravity: Vector3<f64>,
     /// Lowest and highest angle of each joint (°), where all are stated.
     pub(super) limits_deg: Option<[[f64; 2]; 6]>,
     /// Highest speeds (°/s), where all are stated.

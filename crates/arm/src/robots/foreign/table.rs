@@ -12,6 +12,7 @@ use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
 use super::chain::{ForeignArm, Step, about_z};
 use super::common::{foreign_error, maker_of};
+use crate::bounds;
 use crate::robots::error::RobotError;
 use truegrind_math::se3::Pose;
 
@@ -137,6 +138,26 @@ impl<'a> Table<'a> {
         Ok(values)
     }
 
+    /// A length in millimetres or metres, whichever its column says; refused where metres are plainly millimetres. (Links of a calibrated
+    /// table may lead hundreds of metres away, but not all of them do.)
+    fn lengths(&self, in_mm: &str, in_metres: &str) -> Result<[f64; 6], RobotError> {
+        let lengths = self.needed(&[(in_mm, 1.0), (in_metres, 1000.0)])?;
+        let mut stated = lengths.iter().filter(|length| **length != 0.0).peekable();
+        if self.column(in_mm).is_none()
+            && stated.peek().is_some()
+            && stated.all(|length| !bounds::LENGTH_MM.contains(*length))
+        {
+            return Err(foreign_error(
+                self.file,
+                format!("column {in_metres}"),
+                format!("{:?}", lengths.map(|mm| mm / 1000.0)),
+                "metres",
+                "these look like millimetres: name the column after them",
+            ));
+        }
+        Ok(lengths)
+    }
+
     fn needed(&self, names: &[(&str, f64)]) -> Result<[f64; 6], RobotError> {
         self.numbers(names)?.ok_or_else(|| {
             foreign_error(
@@ -211,8 +232,8 @@ pub(super) fn read(text: &str, file: &str) -> Result<ForeignArm, RobotError> {
     let modified = table.modified()?;
     let theta = table.angles("theta_deg", "theta_rad")?;
     let alpha = table.angles("alpha_deg", "alpha_rad")?;
-    let d = table.needed(&[("d_mm", 1.0), ("d_m", 1000.0)])?;
-    let a = table.needed(&[("a_mm", 1.0), ("a_m", 1000.0)])?;
+    let d = table.lengths("d_mm", "d_m")?;
+    let a = table.lengths("a_mm", "a_m")?;
     let low = table.numbers(&[("min_deg", 1.0), ("min_rad", 1.0 / degree)])?;
     let high = table.numbers(&[("max_deg", 1.0), ("max_rad", 1.0 / degree)])?;
     let (maker, dialect) = {
@@ -224,6 +245,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<ForeignArm, RobotError> {
     Ok(ForeignArm {
         steps,
         after,
+        gravity: -Vector3::z(),
         limits_deg: low.zip(high).map(|(low, high)| std::array::from_fn(|i| [low[i], high[i]])),
         speed_deg_s: table.numbers(&[("speed_deg_s", 1.0), ("speed_rad_s", 1.0 / degree)])?,
         joint_map: table.joint_map()?,

@@ -27,6 +27,7 @@ fn foreign(steps: [super::chain::Step; 6], after: Pose, file: &str, what: &str) 
     ForeignArm {
         steps,
         after,
+        gravity: -Vector3::z(),
         limits_deg: None,
         speed_deg_s: None,
         joint_map: None,
@@ -48,6 +49,15 @@ pub(super) fn read_yaml(text: &str, file: &str) -> Result<ForeignArm, RobotError
         let plain = line.split('#').next().unwrap_or_default();
         let Some((key, value)) = plain.split_once(':') else { continue };
         let (key, value) = (key.trim().trim_matches(['"', '\'']), value.trim());
+        if value.starts_with('{') && NAMES.contains(&key) {
+            return Err(foreign_error(
+                file,
+                format!("line {}, kinematics.{key}", number + 1),
+                format!("`{}`", plain.trim()),
+                "x, y, z, roll, pitch and yaw, each in a line of its own",
+                "write them so, as ur_calibration does",
+            ));
+        }
         if value.is_empty() {
             joint = NAMES.iter().position(|name| *name == key);
             continue;

@@ -5,7 +5,7 @@
 //! joint belong to the link before it, with their masses.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use roxmltree::{Document, Node, ParsingOptions};
@@ -13,6 +13,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 use super::chain::{ForeignArm, Mesh, Step, from_rpy};
 use super::common::{ImportOptions, foreign_error, maker_of};
 use crate::body::Body;
+use crate::bounds::{self, display_number};
 use crate::robots::error::RobotError;
 use truegrind_math::se3::Pose;
 
@@ -48,6 +49,47 @@ impl Joint<'_> {
     fn is_moving(&self) -> bool {
         self.kind != JointKind::Fixed
     }
+
+    /// Refuses a place that no link of an arm has.
+    fn check_length(&self, file: &str) -> Result<(), RobotError> {
+        let metres = self.before.translation.vector / 1000.0;
+        if metres.iter().all(|length| bounds::LENGTH_MM.contains(1000.0 * length)) {
+            return Ok(());
+        }
+        let shown: Vec<String> = metres.iter().map(|&length| shown(length)).collect();
+        Err(foreign_error(
+            file,
+            format!("line {}, joint {}, <origin xyz>", self.line, self.name),
+            format!("`{}`", shown.join(" ")),
+            "metres, within ±10",
+            "if these are millimetres, divide every length of the file by 1000",
+        ))
+    }
+
+    /// Refuses a range in degrees, and one without angles in it.
+    fn check_limits(&self, file: &str) -> Result<(), RobotError> {
+        let Some([low, high]) = self.limits_rad else { return Ok(()) };
+        let (expected, remedy) =
+            if ![low, high].iter().all(|angle| bounds::JOINT_DEG.contains(angle.to_degrees())) {
+                ("radians, within ±62.8", "if these are degrees, divide every angle of the file by 57.29578")
+            } else if low >= high {
+                ("lower below upper", "swap or correct them")
+            } else {
+                return Ok(());
+            };
+        Err(foreign_error(
+            file,
+            format!("line {}, joint {}, <limit>", self.line, self.name),
+            format!("lower {} and upper {}", shown(low), shown(high)),
+            expected,
+            remedy,
+        ))
+    }
+}
+
+/// A number as a file states it, without what the conversion of its unit rounds.
+fn shown(value: f64) -> String {
+    display_number((value * 1e9).round() / 1e9 + 0.0)
 }
 
 struct Tree<'a> {
@@ -239,6 +281,17 @@ fn joint<'a>(node: &Node<'a, '_>, file: &str) -> Result<Joint<'a>, RobotError> {
 fn body(node: &Node<'_, '_>, file: &str) -> Result<Option<Body>, RobotError> {
     let Some(inertial) = child(node, "inertial") else { return Ok(None) };
     let [mass_kg] = numbers(child(&inertial, "mass"), "value", [0.0], file)?;
+    if mass_kg < 0.0 {
+        let name = node.attribute("name").unwrap_or("without a name");
+        let line = node.document().text_pos_at(inertial.range().start).row;
+        return Err(foreign_error(
+            file,
+            format!("line {line}, link {name}, <mass>"),
+            display_number(mass_kg),
+            "a mass in kg, 0 or more",
+            "correct it",
+        ));
+    }
     let centre = origin(&inertial, file)?.translation.vector;
     Ok((mass_kg > 0.0).then(|| Body { mass_kg, centre_mm: centre.into() }))
 }
@@ -277,10 +330,21 @@ impl<'a> Tree<'a> {
             meshes: 0,
             visuals: Vec::new(),
         };
+        let mut names = BTreeSet::new();
         for node in root.children().filter(Node::is_element) {
             match node.tag_name().name() {
                 "link" => {
                     let name = node.attribute("name").unwrap_or_default();
+                    if !names.insert(name) {
+                        let line = node.document().text_pos_at(node.range().start).row;
+                        return Err(foreign_error(
+                            file,
+                            format!("line {line}, link {name}"),
+                            "a second link of this name",
+                            "a name of its own for each link",
+                            "rename or take out one of the two",
+                        ));
+                    }
                     tree.links.push(name);
                     if let Some(body) = body(&node, file)? {
                         tree.masses.insert(name, body);
@@ -563,6 +627,13 @@ impl<'a> Tree<'a> {
         let (dialect, maker) = maker_of(&format!("{robot} {}", self.file));
         let mut notes =
             vec![format!("joints 1 to 6 are {}; from link {base} to link {tip}", self.names(&moving))];
+        notes.extend(self.above_base(base));
+        for joint in path.iter().map(|joint| &self.joints[*joint]) {
+            joint.check_length(self.file)?;
+        }
+        for joint in six {
+            joint.check_limits(self.file)?;
+        }
         let limits = six.map(|joint| joint.limits_rad);
         let unlimited: Vec<&str> =
             six.iter().filter(|joint| joint.limits_rad.is_none()).map(|joint| joint.name).collect();
@@ -603,6 +674,7 @@ impl<'a> Tree<'a> {
         Ok(ForeignArm {
             steps,
             after: before,
+            gravity: self.gravity(base),
             limits_deg,
             speed_deg_s: speeds
                 .iter()
@@ -617,6 +689,40 @@ impl<'a> Tree<'a> {
             visuals: self.shown(base, &moving),
             notes,
         })
+    }
+
+    /// The joints above a link, the nearest first.
+    fn above(&self, link: &str) -> Vec<&Joint<'a>> {
+        let mut out: Vec<&Joint<'a>> = Vec::new();
+        let mut at = link;
+        while let Some(joint) = self.to.get(at).map(|joint| &self.joints[*joint]) {
+            out.push(joint);
+            at = joint.parent;
+            // A cycle has no root.
+            if out.len() > self.joints.len() {
+                break;
+            }
+        }
+        out
+    }
+
+    /// Direction of gravity in a link: along −z of the root of the tree, with the joints above the link at zero.
+    fn gravity(&self, link: &str) -> Vector3<f64> {
+        let down = -Vector3::z();
+        self.above(link).iter().rev().fold(down, |down, joint| joint.before.rotation.inverse() * down)
+    }
+
+    /// Notes on what is above a base that is not the root.
+    fn above_base(&self, base: &str) -> Option<String> {
+        let above = self.above(base);
+        let root = above.last()?.parent;
+        let moving: Vec<&str> =
+            above.iter().filter(|joint| joint.is_moving()).map(|joint| joint.name).collect();
+        let at_zero = match moving.as_slice() {
+            [] => String::new(),
+            moving => format!(", with {} at zero", moving.join(", ")),
+        };
+        Some(format!("gravity points along −z of link {root}, the root of the tree{at_zero}"))
     }
 
     /// The meshes of the arm's links and of links fixed to them.

@@ -247,7 +247,7 @@ pub struct RunConditions {
     /// Payloads (kg), cycled row by row.
     #[serde(default)]
     pub payload_kg: Vec<f64>,
-    /// Centre of the payload in the last frame (mm).
+    /// Centre of the payload in the flange frame (mm).
     #[serde(default)]
     pub payload_centre_mm: [f64; 3],
     /// Approach side of the joints.
