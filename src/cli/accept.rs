@@ -87,6 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     };
     let (_, dataset) = read(&data)?;
     arguments.stated.refuse_point_alone()?;
+    arguments.stated.refuse_frame_alone()?;
     let options = Options {
         tolerance_mm: arguments.tolerance,
         uncertainty_mm: arguments.sensor_uncertainty,

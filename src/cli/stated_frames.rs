@@ -200,6 +200,20 @@ impl StatedFrameArguments {
         Ok(())
     }
 
+    /// Refuses a sensor that is stated without the target, where the placement is tested with both.
+    pub(super) fn refuse_frame_alone(&self) -> anyhow::Result<()> {
+        let placed = self.sensor_frame.is_some() || !self.outlet.is_empty() || !self.cable_zero.is_empty();
+        if placed && self.touched_point.is_none() {
+            let option =
+                if self.sensor_frame.is_some() { "--sensor-frame" } else { "--outlet and --cable-zero" };
+            bail!(
+                "--touched-point is missing: {option} tests where base and flange are, together with where the target sits on the flange \
+                 (--touched-point 0,0,0 at its centre)"
+            );
+        }
+        Ok(())
+    }
+
     /// The frames of a planned measurement. A tracker may stand anywhere; a cable needs its outlet.
     pub(super) fn planned(&self, sensor: Sensor) -> anyhow::Result<Frames> {
         let anchors = self.outlet.len().max(1);

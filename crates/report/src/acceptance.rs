@@ -105,8 +105,8 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> PageVerdict {
     reasons.extend(found.uncounted.map(uncounted));
     if found.is_registered {
         reasons.push(
-            "the placement of the base and the flange was not tested: the sensor was registered with these poses; state --sensor-frame to \
-             test it"
+            "the placement of the base and the flange was not tested: the sensor was registered with these poses; state --sensor-frame (of a cable \
+             --outlet and --cable-zero) and --touched-point to test it"
                 .to_owned(),
         );
     }

@@ -68,6 +68,10 @@ fn a_model_is_accepted_by_poses_of_its_own() {
 
     let (code, out, _) = accept("later.csv", &["0.001", "--sensor-uncertainty", "0.01"]);
     assert!(code == 1 && out.contains("[failed] Not accepted"), "{out}");
+    // Without the target the flange's centre was taken for it, and a good model failed.
+    let (code, _, err) =
+        accept("later.csv", &["1", "--sensor-frame", "2310.5,-640.2,512.7,0.12,0.02,-0.03,0.99"]);
+    assert!(code == 2 && err.contains("--touched-point is missing: --sensor-frame tests where"), "{err}");
     let (code, _, err) = accept("poses.csv", &["1"]);
     assert!(code == 2 && err.contains("the model was fitted to these rows"), "{err}");
     let few: String = fs::read_to_string(at.join("later.csv"))

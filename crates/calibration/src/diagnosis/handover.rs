@@ -495,7 +495,7 @@ fn judge(case: &Judged<'_>) -> Verdict {
     if too_many_aside(aside, rows) {
         verdict.fail(format!(
             "{aside} of {rows} rows were set aside as outliers, so a model that fits the others need not describe the arm. Check that the sensor \
-             stayed where it was (a column station names its places), and that each reading belongs to the joint angles beside it"
+             stayed where it was (a column station names its places, a column anchor numbers the outlets of a cable), and that each reading belongs to the joint angles beside it"
         ));
     }
     verdict.check_links(case.parameters, &case.options.arm_tolerance, LINK_Z);

@@ -37,7 +37,7 @@ const MM_IN_METRE: f64 = 1000.0;
 pub(crate) fn advice(explanation: Option<&str>) -> String {
     match explanation {
         Some(explanation) => format!(": {explanation}"),
-        None => ": check that --robot is the measured arm, that the sensor stayed where it was (a column station names its places), that no two \
+        None => ": check that --robot is the measured arm, that the sensor stayed where it was (a column station names its places, a column anchor numbers the outlets of a cable), that no two \
                  columns are swapped, that lengths are in mm and angles in degrees, that each joint counts in the controller's direction and from its \
                  zero, and try --angles dh"
             .to_owned(),

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::fit::Fitted;
 use super::repeats::residuals_mm;
-use crate::measurement::dataset::Dataset;
+use crate::measurement::dataset::{Dataset, Sensor};
 
 /// Fewest rows of a session that is judged.
 const MIN_ROWS: usize = 8;
@@ -64,9 +64,13 @@ pub(super) fn set_up_anew(dataset: &Dataset, fitted: &Fitted) -> Option<String> 
         .max_by(|a, b| a.2.total_cmp(&b.2))?;
     let name =
         |session: &str| if session.is_empty() { "without a name".to_owned() } else { session.to_owned() };
+    let (set_up, column) = match dataset.sensor {
+        Sensor::Cable => ("its outlet was moved or its zero set anew", "anchor (a number for each)"),
+        _ => ("the sensor was set up elsewhere", "station"),
+    };
     Some(format!(
         "the readings of sessions {} and {} differ by {mm:.3} mm in the mean with one sensor frame and one target for both: sensor or \
-         target was moved. If the sensor was set up elsewhere, say so in a column station; otherwise let `diagnose` find what moved",
+         target was moved. If {set_up}, say so in a column {column}; otherwise let `diagnose` find what moved",
         name(a.0),
         name(b.0)
     ))

@@ -97,9 +97,21 @@ impl HeaderColumns {
             }
         }
         let of_cable = sensor == Sensor::Cable;
-        let idle = if of_cable { "station" } else { "anchor" };
-        let other: Vec<(String, usize)> =
-            named.iter().filter(|(n, _)| !is_used(n) || n == idle).cloned().collect();
+        // The outlets of a cable are numbered; what is named a station still says which rows belong together.
+        let stations_of_cable = get("station").filter(|_| of_cable && get("session").is_none());
+        let is_idle = |name: &str| match name {
+            "station" => of_cable && stations_of_cable.is_none(),
+            "anchor" => !of_cable,
+            _ => !is_used(name),
+        };
+        let other: Vec<(String, usize)> = named.iter().filter(|(n, _)| is_idle(n)).cloned().collect();
+        if stations_of_cable.is_some() {
+            notes.push(
+                "column station is read as session: where the outlet of a cable stands, and when its zero was set, is told by the column anchor, \
+                 a number for each"
+                    .to_owned(),
+            );
+        }
         if !other.is_empty() {
             let names: Vec<String> = other.iter().map(|(n, _)| format!("`{n}`")).collect();
             notes.push(format!("columns kept but not used: {}", names.join(", ")));
@@ -115,7 +127,7 @@ impl HeaderColumns {
             time: get("t"),
             temperature: get("temperature"),
             payload: get("payload"),
-            session: get("session"),
+            session: get("session").or(stations_of_cable),
             approach,
             anchor: get("anchor").filter(|_| of_cable),
             station: get("station").filter(|_| !of_cable),

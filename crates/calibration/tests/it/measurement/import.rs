@@ -17,6 +17,22 @@ fn complaint(text: &str) -> String {
 
 const HEADER: &str = "q1,q2,q3,q4,q5,q6,L";
 
+/// A cable whose days were named in the column station lost them, and with them the refusal that they differ.
+#[test]
+fn the_stations_of_a_cable_are_sessions() {
+    let read_as = |header: &str| {
+        let text = format!("L,q1,q2,q3,q4,q5,q6,{header}\n500.5,1,2,3,4,5,6,a,1\n501.5,2,3,4,5,6,7,b,1\n");
+        read(&text).unwrap()
+    };
+    let named = read_as("station,anchor");
+    let sessions: Vec<Option<&str>> = named.rows.iter().map(|row| row.session()).collect();
+    assert_eq!(sessions, [Some("a"), Some("b")]);
+    assert!(named.notes.iter().any(|note| note.starts_with("column station is read as session")));
+    let both = read_as("session,station");
+    assert_eq!(both.rows[1].session(), Some("b"));
+    assert!(both.notes.iter().any(|note| note == "columns kept but not used: `station`"), "{:?}", both.notes);
+}
+
 #[test]
 fn columns_in_any_order_with_others_between() {
     let data = read(
