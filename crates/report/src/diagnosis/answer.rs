@@ -77,10 +77,16 @@ fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
         (true, Some(_)) => " with the rounding of the log",
         (false, _) => ", which is that of rounding alone",
     };
+    // A ratio to what three decimals show as 0 is no figure.
+    let compared = if floor < SHOWN_MM && !diagnosis.is_noise_measured() {
+        "far above the noise floor, of which only a rounding of less than 0.001 mm is known".to_owned()
+    } else {
+        format!("{times:.0} times the noise floor ({floor:.3} mm{source})")
+    };
     let mut out = vec![
         format!(
-            "the held-out error{left} ({:.3} mm) is {times:.0} times the noise floor ({floor:.3} mm{source}), too much for noise: its \
-             cause is not in the catalogue, or lies in the measurement",
+            "the held-out error{left} ({:.3} mm) is {compared}, too much for noise: its cause is not in the catalogue, or lies in the \
+             measurement",
             diagnosis.fits.extended.cv_rmse_mm
         ),
         format!("what to check: {}", what_to_check(diagnosis.dataset.sensor)),

@@ -192,6 +192,11 @@ fn a_remainder_far_above_the_noise_floor_is_a_warning() {
     assert!(flagged && text.contains("[warning] No cause beyond geometry was found"), "{text}");
     assert!(text.contains("is 261 times the noise floor (0.004 mm, which is that of rounding"), "{text}");
     assert!(text.contains("one target in one nest") && text.contains("several times"), "{text}");
+    assert!(text.contains("that all rows are of one arm") && text.contains("those of its reading"), "{text}");
+    // Angles of four decimals round to a tenth of a micrometre, of which no ratio is told.
+    let (text, flagged) = summary(1.93, 0.0004, rounding);
+    assert!(flagged && text.contains("(1.930 mm) is far above the noise floor"), "{text}");
+    assert!(!text.contains("times the noise floor"), "{text}");
     // Rounding says nothing of the sensor, whose usual noise explains this.
     let (text, flagged) = summary(0.03, 0.004, rounding);
     assert!(!flagged && text.contains("[ok] No cause beyond geometry was found"), "{text}");

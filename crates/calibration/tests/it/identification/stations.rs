@@ -205,11 +205,17 @@ fn a_station_with_too_few_rows_is_refused_by_name() {
 }
 
 #[test]
-fn a_track_follows_one_station() {
-    let (rows, _) = measured("position", 90);
-    let model = identified(&matched(rows.clone())).estimated;
-    let refused = Tracker::begin(&model, "hash", &moved(rows), &TrackOptions::default()).unwrap_err();
-    assert!(refused.to_string().contains("3 stations"), "{refused}");
+fn a_track_follows_the_stations() {
+    for sensor in ["position", "pose"] {
+        let (rows, _) = measured(sensor, 120);
+        let model = identified(&matched(rows.clone())).estimated;
+        let moved = moved(rows);
+        let mut tracker = Tracker::begin(&model, "hash", &moved, &TrackOptions::default()).unwrap();
+        let alarms = tracker.process_file(&moved).unwrap();
+        assert!(alarms.is_empty(), "{sensor}: {alarms:#?}");
+        assert_eq!((tracker.state().poses, tracker.state().outliers), (120, 0), "{sensor}");
+        assert!(!tracker.departure().unwrap().is_significant, "{sensor}");
+    }
 }
 
 #[test]
