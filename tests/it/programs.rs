@@ -403,10 +403,10 @@ fn what_is_left_shows_everywhere() {
     let place = |x: f64| format!("[[{x:.1},10,450],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
     // The routine takes its target at run time.
     let body = format!(
-        "    ! Points.\n    MoveJ {},v100,fine,tool0;\n    MoveL {},v100,fine,tool0;\n    along {},3;\n    MoveL {},v100,fine,tool0;\n",
+        "    ! Points.\n    MoveJ {},v100,fine,tool0;\n    along {},3;\n    MoveL {},v100,fine,tool0;\n    MoveL {},v100,fine,tool0;\n",
         place(340.0),
+        place(342.0),
         place(350.0),
-        place(352.0),
         place(370.0)
     );
     let text = format!(

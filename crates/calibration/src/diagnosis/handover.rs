@@ -9,7 +9,7 @@ use super::link_geometry::LINK_Z;
 use super::options::Options;
 use super::search::{Search, SearchContext};
 use super::selection::contains_cause;
-use super::sensor_causes::{self, probability_worse};
+use super::sensor_causes::{self, Apart, apart};
 use super::validation::{ErrorsByStage, StageError};
 use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
@@ -89,7 +89,7 @@ struct WrittenArm<'a> {
     /// what a fit without the causes of the measurement lacks beyond that is not.
     beside_sensor: StageError,
     /// The fit with the causes of the measurement, where it is not written.
-    with_sensor: Option<&'a Extended>,
+    left_out: Option<&'a LeftOut>,
 }
 
 impl Handover<'_> {
@@ -103,24 +103,24 @@ impl Handover<'_> {
         let beside_sensor = certain.errors;
         let (WrittenFit { fit, errors }, left_out) = without_measurement_causes(search, certain, discrepancy);
         let fit = if fit.causes.is_empty() { self.as_identified(&fit).unwrap_or(fit) } else { fit };
-        notes.extend(left_out.as_ref().map(|LeftOut { probability, .. }| {
+        notes.extend(left_out.as_ref().map(|LeftOut { apart, .. }| {
             format!(
                 "the written arm was fitted without the causes in the measurement, which might make its links worse (probability \
                  {:.0} %, at most {:.0} % are allowed)",
-                100.0 * probability,
+                100.0 * apart.probability_worse,
                 100.0 * sensor_causes::MAX_PROBABILITY
             )
         }));
-        let with_sensor = left_out.as_ref().map(|left_out| &left_out.fit);
+        let left_out = left_out.as_ref();
         let with_uncertain = with_uncertain_causes(search, &fit, discrepancy);
         let with_causes = self.estimated(&WrittenArm {
             with_uncertain: with_uncertain.as_ref().unwrap_or(&fit),
             fitted: &fit,
             errors,
             beside_sensor,
-            with_sensor,
+            left_out,
         });
-        self.or_geometry_alone(with_causes, beside_sensor, with_sensor, notes)
+        self.or_geometry_alone(with_causes, beside_sensor, left_out, notes)
     }
 
     /// From too few poses to search causes in, the arm, benefit and verdict of `identify`, which fits the same rows. `None` where it refuses them.
@@ -140,7 +140,7 @@ impl Handover<'_> {
         &self,
         with_causes: WrittenModel,
         beside_sensor: StageError,
-        with_sensor: Option<&Extended>,
+        left_out: Option<&LeftOut>,
         notes: &mut Vec<String>,
     ) -> WrittenModel {
         let verdict = &with_causes.estimated.verdict;
@@ -154,7 +154,7 @@ impl Handover<'_> {
             with_uncertain: &plain,
             errors: self.search.validation.stage(&plain),
             beside_sensor,
-            with_sensor,
+            left_out,
         });
         if !matches!(alone.estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated) {
             return with_causes;
@@ -199,8 +199,8 @@ impl Handover<'_> {
         let SearchContext { subject, options, .. } = self.search.context;
         let (nominal, rows) = (subject.nominal, &subject.observed.dataset);
         let [fitted, mut handed] = [arm.fitted, arm.with_uncertain].map(|fit| self.widened(fit));
-        if let Some(with_sensor) = arm.with_sensor {
-            add_shift(&mut handed, arm.fitted, with_sensor);
+        if let Some(left_out) = arm.left_out {
+            add_shift(&mut handed, arm.fitted, &left_out.fit);
         }
         let (fitted, handed) = (&fitted, &handed);
         let beyond_noise = self.beyond_noise_of(arm);
@@ -221,6 +221,7 @@ impl Handover<'_> {
                 // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
                 benefit(fitted, rows, &estimated, &options.arm_tolerance, inflation)
                     .map(|benefit| benefit.with_unmodelled(beyond_noise.at_least_scatter(scatter_mm)))
+                    .map(|benefit| benefit.with_shift(arm.left_out.map_or(0.0, |out| out.apart.shape_mm)))
             }
         };
         estimated.verdict = judge(&Judged {
@@ -391,8 +392,8 @@ fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Dis
 /// A fit with the causes of the measurement that is not written.
 struct LeftOut {
     fit: Extended,
-    /// That it is worse than the one that is written.
-    probability: f64,
+    /// From the one that is written.
+    apart: Apart,
 }
 
 /// Adds to the covariance of a fit how far its links and frames would be from the written ones with the causes of the measurement: these are
@@ -429,10 +430,10 @@ fn without_measurement_causes(
     let without = written(search, &of_the_arm, correlated);
     let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
     let beside = in_doubt::with_zero_causes(&without, certain.fit.clone());
-    match probability_worse(&certain.fit, &beside, &median_condition(dataset), &samples) {
-        Some(probability) if probability > sensor_causes::MAX_PROBABILITY => {
+    match apart(&certain.fit, &beside, &median_condition(dataset), &samples) {
+        Some(apart) if apart.probability_worse > sensor_causes::MAX_PROBABILITY => {
             let written = WrittenFit { errors: search.validation.stage(&without), fit: without };
-            (written, Some(LeftOut { fit: certain.fit, probability }))
+            (written, Some(LeftOut { fit: certain.fit, apart }))
         }
         _ => (certain, None),
     }

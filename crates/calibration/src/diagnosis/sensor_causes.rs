@@ -18,19 +18,27 @@ use truegrind_math::tail::normal_cdf;
 /// Largest probability of a worse arm up to which the written arm is fitted with the causes of the measurement.
 pub(super) const MAX_PROBABILITY: f64 = 0.02;
 
-/// The probability that the arm of `without` is nearer in shape to the true one than that of `with`, which has the same parameters;
-/// `None` if it cannot be computed.
-pub(super) fn probability_worse(
+/// How far an arm fitted with causes of the measurement is from the same one fitted without.
+pub(super) struct Apart {
+    /// The probability that the one without is nearer in shape to the true arm.
+    pub(super) probability_worse: f64,
+    /// How far their shapes are apart over the region: √(δᵀMδ) (mm RMS).
+    pub(super) shape_mm: f64,
+}
+
+/// Compares the arm of `with` and that of `without`, which has the same parameters; `None` if that cannot be computed.
+pub(super) fn apart(
     with: &Extended,
     without: &Extended,
     condition: &Condition,
     samples_deg: &[[f64; 6]],
-) -> Option<f64> {
+) -> Option<Apart> {
     let weights = shape_metric(&Fitted::from(with), condition, samples_deg)?;
     let covariance = with.estimate.covariance.as_ref()?;
     let apart = nalgebra::DVector::from_fn(with.x.len(), |k, _| with.x[k] - without.x[k]);
     let along = &weights * &apart;
     let variance = along.dot(&(covariance * &along));
-    let chance = normal_cdf(-0.5 * along.dot(&apart) / variance.sqrt());
-    chance.is_finite().then_some(chance)
+    let square = along.dot(&apart);
+    let probability_worse = normal_cdf(-0.5 * square / variance.sqrt());
+    probability_worse.is_finite().then(|| Apart { probability_worse, shape_mm: square.max(0.0).sqrt() })
 }

@@ -91,6 +91,16 @@ impl Benefit {
         }
     }
 
+    /// The benefit of an arm that is likely to be off by `shift_mm` (RMS) in shape, since it was fitted without a cause of the measurement.
+    pub(crate) fn with_shift(self, shift_mm: f64) -> Self {
+        Self {
+            estimated_mm: self.estimated_mm.hypot(shift_mm),
+            estimated_at_most_mm: self.estimated_at_most_mm.hypot(shift_mm),
+            estimated_without_scale_mm: self.estimated_without_scale_mm.hypot(shift_mm),
+            ..self
+        }
+    }
+
     /// `estimated_at_most_mm` where that counts: what may be noise or the arm's is more than all that is expected of the arm.
     pub fn counting_at_most_mm(&self) -> Option<f64> {
         let (expected, most) = (self.estimated_mm, self.estimated_at_most_mm);

@@ -52,7 +52,7 @@ fn mean_square(errors: &StageErrors, parameters: f64) -> f64 {
 
 /// The same of a fit with so many parameters.
 pub(super) fn mean_square_of(errors: &StageErrors, parameters: usize, sensor: Sensor) -> f64 {
-    mean_square(errors, parameters as f64 / sensor.axes() as f64)
+    mean_square(errors, parameters as f64 / sensor.scalars() as f64)
 }
 
 impl BeyondNoise {

@@ -18,12 +18,9 @@ use crate::arms::Arms;
 use crate::backlash::play_operator::PlayOperator;
 use crate::segment::curve::{Curve, between, lateral_offset};
 use crate::segment::line::{STEPS, SegmentEnd, largest_from};
+use crate::segment::rounded_end::CUT_MM;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
-
-/// A corner that cuts off less than this is treated as the lines that it joins (mm): over so short a distance the arm's error
-/// changes by less than the sampling accuracy of lines.
-pub(crate) const CUT_MM: f64 = 0.2;
 
 /// A rounded corner: exit from the incoming segment, rounded point, entry into the outgoing segment.
 #[derive(Debug, Clone, Copy, PartialEq)]

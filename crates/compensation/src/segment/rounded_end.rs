@@ -6,7 +6,9 @@
 
 use nalgebra::Vector3;
 
-use crate::segment::corner::CUT_MM;
+/// A corner that cuts off less than this is treated as the lines that it joins (mm): over so short a distance the arm's error
+/// changes by less than the sampling accuracy of lines.
+pub(crate) const CUT_MM: f64 = 0.2;
 
 /// How the path is rounded at an end of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
