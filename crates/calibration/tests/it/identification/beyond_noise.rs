@@ -79,9 +79,11 @@ fn an_excess_over_the_noise_is_expected_though_it_is_not_significant() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let stated = |lacking: f64, rng: &mut ChaCha8Rng| {
         let sigma_mm = NOISE_MM.hypot(lacking);
+        // Held-out rows have the uncertainty of the parameters beside their own error.
+        let held_out_mm = sigma_mm * (1.0 + 12.0 / 47.0_f64).sqrt();
         let errors = StageErrors {
             fitted: drawn(rng, 47, 3 * 47 - 36, sigma_mm),
-            held_out: drawn(rng, 12, 36, sigma_mm),
+            held_out: drawn(rng, 12, 36, held_out_mm),
         };
         let floor = NoiseFloor { sigma_mm: drawn(rng, 12, 36, NOISE_MM).rmse, poses: 12, freedom: 12 };
         let beyond = BeyondNoise::of(&errors, 36, Sensor::Position, Some(&floor));
