@@ -315,8 +315,8 @@ fn a_mistake_that_explains_tracker_readings_is_named() {
         }
         written(&table)
     };
-    refused(&from(150, 6..9, 1e-3), &["those of rows 150, 151", "are metres and the others millimetres"]);
-    refused(&from(150, 0..6, 1f64.to_radians()), &["of rows 150, 151", "radians and the others degrees"]);
+    refused(&from(150, 6..9, 1e-3), &["those of rows 151, 152", "are metres and the others millimetres"]);
+    refused(&from(150, 0..6, 1f64.to_radians()), &["of rows 151, 152", "radians and the others degrees"]);
     // A reading of row 82 is missing, and all later ones moved up.
     let mut short = owned.clone();
     for row in 81..short.len() - 1 {
