@@ -594,7 +594,6 @@ fn what_a_left_out_cause_of_the_measurement_does_to_the_links_is_in_their_uncert
         let links = found.estimated.parameters.iter().filter(|parameter| parameter.is_of_link());
         let squares: Vec<f64> = links.map(|p| ((p.value - p.nominal) / p.sigma).powi(2)).collect();
         let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-        eprintln!("seed {seed}: {rms} {notes:?}");
         assert!(rms < 1.5, "seed {seed}: links are {rms:.2} σ off");
     }
     assert!(left_out > 0, "the sag must be left out of a fit");
