@@ -131,7 +131,7 @@ fn key_figures(study: &Study) -> Vec<KeyFigure> {
         figures.push(
             KeyFigure::new("Smallest held-out RMSE", Cell::with_sigma(mean, deviation), 3, "mm").note(
                 format!(
-                    "without named causes: {} {}{}",
+                    "of the methods compared: {} {}{}",
                     best.method.id,
                     best.method.name,
                     named_causes_beside(study)
