@@ -3,7 +3,8 @@
 //! Method: with v the whitened readings that a cause makes, R the columns of another and X those of geometry and frames in units of their priors,
 //! the rows leave λ = min |v − R b − X g|² + |g|² over b and g between the two: the non-centrality with which the rows tell the first from the
 //! second, if the first is true (Kay 1998, Fundamentals of Statistical Signal Processing II, section 7.7). The finding is as large as it was found;
-//! a rival is as large as imitates the finding best. Any of them may be true, so the two that are most alike decide.
+//! a rival imitates it as well as it can, and is seen as well: it explained the same readings. Any of them may be true, so the two that are most
+//! alike decide.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -74,13 +75,22 @@ pub(super) fn parting(
     let parts = |rows: &[Row]| -> Option<Parts> {
         let geometry = geometry(setup, parameters, rows, options);
         let shown = shown(setup, rows, finding, size, options)?;
+        let alone = Fit::of(&shown, &geometry, None)?.left;
         let of = |rival: &CandidateCause| Some((rival.clone(), columns_of(setup, rows, rival, options)?));
         let computed: Vec<(CandidateCause, DMatrix<f64>)> =
             std::iter::once(finding).chain(rivals).filter_map(of).collect();
         let mut nearest: Option<([CandidateCause; 2], f64)> = None;
         for (place, (truth, own)) in computed.iter().enumerate() {
-            let readings =
-                if place == 0 { shown.clone() } else { Fit::of(&shown, &geometry, Some(own))?.by_rival };
+            let mut readings = shown.clone();
+            if place > 0 {
+                readings = Fit::of(&shown, &geometry, Some(own))?.by_rival;
+                let seen = Fit::of(&readings, &geometry, None)?.left;
+                // What does not imitate it at all is no rival in these rows.
+                if !(seen > UNSEEN * alone) {
+                    continue;
+                }
+                readings *= (alone / seen).sqrt();
+            }
             for (other, columns) in computed.iter().filter(|(other, _)| other != truth) {
                 let lambda = Fit::of(&readings, &geometry, Some(columns))?.left;
                 if nearest.as_ref().is_none_or(|(_, least)| lambda < *least) {
@@ -88,7 +98,6 @@ pub(super) fn parting(
                 }
             }
         }
-        let alone = Fit::of(&shown, &geometry, None)?.left;
         Some(Parts {
             nearest: nearest?,
             alone,
@@ -211,6 +220,9 @@ impl Fit {
         left.is_finite().then(|| Self { left: left.max(0.0), by_rival })
     }
 }
+
+/// Share of what is seen of the finding from which a rival imitates anything of it.
+const UNSEEN: f64 = 1e-6;
 
 /// A rival may be so many times as large as what it is to imitate.
 const FREE: f64 = 100.0;
