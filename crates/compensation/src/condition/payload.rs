@@ -15,7 +15,7 @@ pub fn payload_at(loads: &Loads, index: usize, motion: &Motion, listing: &Listin
     }
     let tool: &ToolValue = listing.tool(motion)?.value.as_ref().ok()?;
     let own =
-        (tool.mass_kg > 0.0).then(|| Load { mass_kg: tool.mass_kg, centre_mm: tool.centre_of_gravity_mm });
+        (tool.mass_kg > 0.0).then_some(Load { mass_kg: tool.mass_kg, centre_mm: tool.centre_of_gravity_mm });
     let Grip::Holds(held) = loads.grip(index) else { return own };
     let object: &WorkObjectValue = listing.work_object(motion)?.value.as_ref().ok()?;
     let frame: Pose = if tool.robhold { tool.frame.pose() } else { object.user_frame.pose() };

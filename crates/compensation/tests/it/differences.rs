@@ -2,7 +2,9 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
-use truegrind_arm::model::Joints;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::deviation::{After, PathReport};
 use truegrind_compensation::options::{Circles, Emit, Options};
@@ -44,8 +46,12 @@ fn plain() -> Options {
 }
 
 fn judged(original: &str, program: &str) -> PathReport {
+    judged_on(original, program, &perturbed(3, 1.0))
+}
+
+fn judged_on(original: &str, program: &str, actual: &Model) -> PathReport {
     let [before, after] = [original, program].map(|text| Task::read(&[("p.mod", text.as_bytes())]).listing);
-    let (nominal, actual) = (nominal(), perturbed(3, 1.0));
+    let nominal = nominal();
     let task = VerificationTask {
         original: &before,
         rewritten: Some(&after),
@@ -58,7 +64,7 @@ fn judged(original: &str, program: &str) -> PathReport {
         loads: [None, None],
     };
     let acting =
-        ActingArm { nominal: &nominal, model: &actual, knowledge: None, condition: Condition::default() };
+        ActingArm { nominal: &nominal, model: actual, knowledge: None, condition: Condition::default() };
     verify(&task, &acting)
 }
 
@@ -78,6 +84,29 @@ fn whatever_a_correction_writes_is_no_difference() {
         assert!(report.differences.is_empty(), "{:?} {text}", report.differences);
         let worst = report.points.iter().map(|point| point.after.unwrap().norm_mm()).fold(0.0, f64::max);
         assert!(worst < 1e-3, "{worst}");
+    }
+}
+
+/// Behind a reversal a target that takes up the backlash is inserted a tenth of a millimetre from the corner: it was taken for the corner, and
+/// the corner for an added motion with another zone.
+#[test]
+fn targets_that_take_up_backlash_are_not_the_corners_beside_them() {
+    let mut worn = perturbed(3, 1.0);
+    worn.effects.extend([0, 2, 4].map(|joint| Effect::Backlash(Backlash { joint, play_rad: 4e-4 })));
+    let known = estimated(worn.clone(), &[Joints::zeros()]);
+    for (width, height) in [(100.0, 70.0), (60.0, 90.0), (40.0, 40.0)] {
+        let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height], [0.0, 0.0]];
+        let lines = corners
+            .map(|[x, y]| format!("    MoveL [[{:.1},{y:.1},330.0],{PLACE},v100,fine,tool0;\n", 330.0 + x));
+        let source = format!(
+            "MODULE M\n  PROC main()\n    MoveJ [[330.0,0.0,380.0],{PLACE},v100,fine,tool0;\n{}  ENDPROC\nENDMODULE\n",
+            lines.concat()
+        );
+        let (_, text) = rewritten(source.as_bytes(), &known, &Cell::default(), &Options::default());
+        let text = String::from_utf8(text).unwrap();
+        assert!(text.matches("Move").count() > source.matches("Move").count(), "{text}");
+        let report = judged_on(&source, &text, &worn);
+        assert!(report.differences.is_empty(), "{:?} {text}", report.differences);
     }
 }
 
