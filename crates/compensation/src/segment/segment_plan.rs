@@ -104,7 +104,7 @@ fn line(
     // program never stated.
     if motion.insertable
         && motion.modal.wrist_interpolation != Switch::On
-        && let Some(found) = insertions(path, &corners(), arms, options)
+        && let Some(found) = insertions(path, &corners_of(options, corners), arms, options)
         && found.worst_mm() < deviation
     {
         (out.before, left) = (found.before, found.remaining_mm);
@@ -112,6 +112,11 @@ fn line(
     }
     out.flag = (!(left <= options.tolerance_mm)).then_some(OutcomeReason::PathDeviation { mm: left });
     out
+}
+
+/// How the path is rounded at the ends of a line. Between joint targets a corner is one of joints, and a line needs its inserted targets to be one.
+fn corners_of(options: &Options, corners: &dyn Fn() -> [RoundedEnd; 2]) -> [RoundedEnd; 2] {
+    if options.emit == Emit::Joints { <[RoundedEnd; 2]>::default() } else { corners() }
 }
 
 /// Deviation on the way that the control may take instead, where A, B and C run linearly (mm); 0 where that is the same way. Which of the

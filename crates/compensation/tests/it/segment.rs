@@ -10,7 +10,7 @@ use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::deviation::MotionStatus;
-use truegrind_compensation::options::{Circles, Options};
+use truegrind_compensation::options::{Circles, Emit, Options};
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::solved_program::plan;
@@ -205,6 +205,10 @@ fn inserted_targets_keep_clear_of_rounded_corners() {
     }
     let corner_mm = rounded.outcomes[2].path_deviation_mm.get().unwrap();
     assert!(corner_mm < 0.5, "{corner_mm}");
+    // A line between joint targets needs them, whatever the corner.
+    let options = Options { tolerance_mm: 0.05, emit: Emit::Joints, ..Options::default() };
+    let (joints, _) = rewrite(&source("z200").replacen("MoveL", "MoveJ", 1), &known, &options);
+    assert!(joints.outcomes[1].inserted > 0, "{:?}", joints.outcomes[1]);
     // Without a zone they stand wherever they are needed.
     let sharp = planned("fine", 0.005);
     assert!(sharp.outcomes[1].inserted > 0 && sharp.outcomes[2].inserted > rounded.outcomes[2].inserted);
