@@ -67,7 +67,7 @@ impl PyModel {
             return Err(Refusal::new(Kind::Model, message).of_file(name));
         }
         Ok(Self {
-            hash: Estimated::file_hash(&text),
+            hash: Estimated::file_hash(text),
             name: name.to_owned(),
             arm: Arc::new(arm),
             text: text.to_owned(),

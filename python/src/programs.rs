@@ -19,7 +19,7 @@ use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::report::{deviation as deviations, format};
 use truegrind::{
     ActingArm, After, Cell, Circles, CompensateOptions, CompensatePlan, Compensated, Condition, Cuts, Emit,
-    Estimated, Listing, Mark, NcSetup, PathReport, Program, MotionStatus, SurfaceFile, VerificationTask,
+    Estimated, Listing, Mark, MotionStatus, NcSetup, PathReport, Program, SurfaceFile, VerificationTask,
     compensate, robots, verify,
 };
 

@@ -14,7 +14,7 @@ const VISIT: usize = 14;
 /// Visits of an arm that loses the zero of joint 3 after some of them, each read from another place.
 fn visits(count: usize, lost_after: usize) -> Vec<Dataset> {
     let lost = LinkDeviation { joint: 2, theta_deg: 0.05, ..LinkDeviation::default() };
-    let days = [2, 3].map(|seed| [measured(seed, None), measured(seed, Some(lost.clone()))]);
+    let days = [2, 3].map(|seed| [measured(seed, None), measured(seed, Some(lost))]);
     let visit = |visit: usize| {
         let day = &days[visit / 8][usize::from(visit >= lost_after)];
         let from = visit % 8 * VISIT;
