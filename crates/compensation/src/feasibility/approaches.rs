@@ -99,9 +99,6 @@ impl<'a> Starts<'a> {
     ) -> Vec<(u32, OutcomeReason)> {
         let mut found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
         let mut cuts_found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
-        if !self.any_left(blocking_reason) {
-            return Vec::new();
-        }
         // In the order of the text, in which nearly every motion stands behind its start.
         for _ in 0..PASSES {
             let before = found.len();
@@ -150,9 +147,6 @@ impl<'a> Starts<'a> {
         blocking_reason: Obstacle<'_>,
         shift: &Shift<'_>,
     ) -> Vec<(u32, OutcomeReason)> {
-        if !self.any_left(blocking_reason) {
-            return Vec::new();
-        }
         let mut found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
         for index in 0..self.listing.motions.len() as u32 {
             if self.is_path(index) && !self.is_drawn_back(index) || blocking_reason(index).is_some() {
@@ -181,8 +175,8 @@ impl<'a> Starts<'a> {
         found.into_iter().collect()
     }
 
-    /// Whether a motion remains unmodified from whose end another might lead on: most programs have none.
-    fn any_left(&self, blocking_reason: Obstacle<'_>) -> bool {
+    /// Whether a motion remains unmodified to which or from whose end another leads: in most programs none does, and no start need be asked.
+    pub(crate) fn any_left(&self, blocking_reason: Obstacle<'_>) -> bool {
         let motions = (0..self.listing.motions.len() as u32).into_par_iter().with_min_len(MANY_MOTIONS);
         motions.any(|index| {
             blocking_reason(index).is_some_and(|(status, reason)| {

@@ -61,6 +61,7 @@ pub(crate) fn unchanged_motions(
         let shift = Shift { mm: &known_mm, tolerance_mm: options.tolerance_mm };
         let of_starts: Vec<(u32, OutcomeReason)> = starts
             .iter()
+            .filter(|starts| starts.any_left(&kept))
             .flat_map(|starts| {
                 // Air moves of NC programs are judged once they are written.
                 let [approaches, departures] = if listing.numbered {
