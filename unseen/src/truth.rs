@@ -53,7 +53,7 @@ pub enum Meaning {
 /// The names of the diagnosis. One name stands for several families: see [`meanings`].
 ///
 /// A name that is added to the diagnosis is added here, by what its sentence sends a technician to.
-pub const NAMES: [(&str, Family); 46] = [
+pub const NAMES: [(&str, Family); 48] = [
     ("link-geometry", Family::Geometry),
     ("joint-compliance", Family::Compliance),
     ("joint-stiffness", Family::Compliance),
@@ -82,10 +82,12 @@ pub const NAMES: [(&str, Family); 46] = [
     ("sensor-scale", Family::Scale),
     ("sensor-range", Family::Scale),
     ("sensor-axes", Family::Scale),
+    ("lens-distortion", Family::Scale),
     ("sensor-scale-drift", Family::Scale),
     ("cable-sag", Family::Cable),
     ("cable-pulley", Family::Cable),
     ("cable-drum", Family::Cable),
+    ("cable-reversal", Family::Cable),
     ("cable", Family::Cable),
     ("air-refraction", Family::Air),
     ("tool-shift", Family::Target),

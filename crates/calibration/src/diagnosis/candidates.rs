@@ -14,6 +14,9 @@ use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 /// Prior odds of a stand, target or cable that was moved against a joint that lost counts of its encoder, which is rare, and there are six.
 const JOINT_ZERO_ODDS: f64 = 100.0;
 
+/// Those against a sensor that was exchanged for another, or whose constant was entered anew, between two rows.
+const EXCHANGED_SENSOR_ODDS: f64 = 100.0;
+
 /// A candidate with its score against a fit.
 #[derive(Debug, Clone)]
 pub struct Scored {
@@ -60,10 +63,15 @@ impl Catalogue {
         }
         kinds.push(Kind::Load { joints: vec![1, 2], compliance: None });
         kinds.extend((0..6).map(|joint| Kind::JointZero { joint }));
+        kinds.push(Kind::Scale);
         let shifts: Vec<Arc<Candidate>> = kinds
             .into_iter()
             .map(|kind| {
-                let tried = if matches!(kind, Kind::JointZero { .. }) { JOINT_ZERO_ODDS } else { 1.0 };
+                let tried = match kind {
+                    Kind::JointZero { .. } => JOINT_ZERO_ODDS,
+                    Kind::Scale => EXCHANGED_SENSOR_ODDS,
+                    _ => 1.0,
+                };
                 let disturbance = Disturbance::new(kind, Profile::Constant);
                 let candidate = Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames);
                 Arc::new(Candidate { tried, ..candidate })

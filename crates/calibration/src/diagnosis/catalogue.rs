@@ -588,6 +588,22 @@ fn drum(dataset: &Dataset) -> EmpiricalFault {
     EmpiricalFault::Drum { from_mm: low.min(high).max(0.0).floor() as u32, to_mm: high.ceil() as u32 }
 }
 
+/// Whether every target lies within 45° of the z axis of the sensor's frame, on one side, as what a camera sees does.
+fn may_be_camera(subject: &Subject<'_>) -> bool {
+    let posed = subject.nominal.at_condition(&Condition::default());
+    let target = Point3::from(subject.frames.flange_from_target.translation.vector);
+    let sensor_from_base = subject.frames.base_from_sensor.inverse();
+    let mut seen = subject
+        .observed
+        .dataset
+        .rows
+        .iter()
+        .map(|row| sensor_from_base * (posed.forward(&row.joints) * target));
+    let ahead = |at: &Point3<f64>| at.z.abs() > at.x.hypot(at.y);
+    let Some(first) = seen.next() else { return false };
+    ahead(&first) && seen.all(|at| ahead(&at) && at.z * first.z > 0.0)
+}
+
 /// A range fault over the distances of the rows.
 fn range(subject: &Subject<'_>) -> EmpiricalFault {
     let posed = subject.nominal.at_condition(&Condition::default());
@@ -638,6 +654,9 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     if has(false) && (!has(true) || median_interval_h(dataset).is_some_and(|hours| hours > STOP_H)) {
         out.extend([(EmpiricalFault::ArmUnsettled, 2.0), (EmpiricalFault::SensorUnsettled, 2.0)]);
     }
+    if has(false) && dataset.sensor == Sensor::Cable {
+        out.push((EmpiricalFault::CableReversal, 1.0));
+    }
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
     let exact = out.len();
     out.push((EmpiricalFault::NonlinearStiffness { joint: 0, load: AssumedLoad::Masses }, 1.0));
@@ -655,6 +674,7 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     } else {
         out.push((EmpiricalFault::Refraction, 1.0));
         out.extend([(range(subject), 1.0), (EmpiricalFault::SensorAxes, 1.0)]);
+        out.extend(may_be_camera(subject).then_some((EmpiricalFault::Lens, 1.0)));
         out.extend([false, true].map(|second| (EmpiricalFault::TargetNest { second }, 2.0)));
     }
     out.extend(target_droops(dataset));

@@ -62,8 +62,10 @@ impl Cause {
                     EmpiricalFault::Refraction => CauseKind::AirRefraction,
                     EmpiricalFault::Pulley => CauseKind::CablePulley,
                     EmpiricalFault::Drum { .. } => CauseKind::CableDrum,
+                    EmpiricalFault::CableReversal => CauseKind::CableReversal,
                     EmpiricalFault::Range { .. } => CauseKind::SensorRange,
                     EmpiricalFault::SensorAxes => CauseKind::SensorAxes,
+                    EmpiricalFault::Lens => CauseKind::LensDistortion,
                     EmpiricalFault::TargetNest { .. } => CauseKind::TargetNest,
                     EmpiricalFault::TargetDroop { .. } => CauseKind::TargetDroop,
                     EmpiricalFault::BaseTilt { .. } => CauseKind::BaseTilt,
@@ -180,10 +182,19 @@ impl Cause {
         }
     }
 
-    /// Whether it is an error of the sensor's scale that does not drift.
+    /// Whether it is an error of the sensor's scale that is the same in all rows.
     pub fn is_constant_scale(&self) -> bool {
-        let Cause::Measurement(Disturbance { kind: Kind::Scale, profile, .. }) = self else { return false };
-        !matches!(profile, Profile::Exponential { .. } | Profile::Temperature { .. })
+        matches!(self, Cause::Measurement(Disturbance { kind: Kind::Scale, profile: Profile::Constant, .. }))
+    }
+
+    /// By how much the sensor's scale differs in some rows from that of the others; `None` for any other cause.
+    pub fn scale_step(&self) -> Option<f64> {
+        match self {
+            Cause::Measurement(Disturbance { kind: Kind::Scale, profile: Profile::Rows { .. }, values }) => {
+                Some(values[0])
+            }
+            _ => None,
+        }
     }
 
     /// Whether it is deflection by gravity along horizontal axes of the base, as in an arm mounted at a tilt.

@@ -40,6 +40,8 @@ kinds! {
     CableDrum = "cable-drum",
     /// A pulley or a worn outlet.
     CablePulley = "cable-pulley",
+    /// A cable sensor that reads otherwise when the cable pays out than when it winds in.
+    CableReversal = "cable-reversal",
     /// A cable that sags under its own weight.
     CableSag = "cable-sag",
     /// An eccentric gear or encoder ring.
@@ -60,6 +62,8 @@ kinds! {
     JointZeroShift = "joint-zero-shift",
     /// Angles and reading of a row taken at different times.
     Latency = "latency",
+    /// A camera whose lens distorts.
+    LensDistortion = "lens-distortion",
     /// A link that bends under what it carries.
     LinkBending = "link-bending",
     /// Links other than those of the data sheet: a rival of findings, never a finding.

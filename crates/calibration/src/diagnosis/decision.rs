@@ -41,8 +41,8 @@ pub(super) fn family(effect: CauseKind) -> Option<Family> {
         }
         GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | JointZeroShift
         | Backlash => Family::Drive,
-        SensorScale | SensorAxes | SensorRange | CableSag | CablePulley | CableDrum | AirRefraction
-        | TargetNest | TargetDroop => Family::Sensor,
+        SensorScale | SensorAxes | SensorRange | LensDistortion | CableSag | CablePulley | CableDrum
+        | CableReversal | AirRefraction | TargetNest | TargetDroop => Family::Sensor,
         SensorZeroShift | SensorFrameShift | ToolShift | BaseTilt | PayloadChange | SetupChange => {
             Family::SetUp
         }
@@ -119,6 +119,13 @@ fn in_words(effect: CauseKind) -> Option<&'static str> {
         }
         SensorRange => {
             "measure known lengths with the sensor at its least and greatest distance: what they are off by is the sensor's"
+        }
+        LensDistortion => {
+            "measure the same ten poses with the camera turned by 90° about its axis, and again with the target near the middle of the picture: \
+             what changes is the lens"
+        }
+        CableReversal => {
+            "measure the same ten poses twice, once with the cable paying out to each and once winding in: what changes is the sensor"
         }
         CableSag | CablePulley | CableDrum => {
             "move the cable's outlet to another place and measure again (`diagnose --also`): what follows the cable and not the pose is the \

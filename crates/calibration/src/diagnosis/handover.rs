@@ -23,6 +23,7 @@ use crate::identification::identify::{
 use crate::identification::inflation::inflation_from_errors;
 use crate::identification::linearised_readings::widen_by_scale;
 use crate::identification::parameter_table::parameter_table;
+use crate::identification::tolerance::Tolerance;
 use crate::identification::unseen_target::unseen_target;
 use crate::identification::verdict::VerdictBuilder;
 use crate::measurement::dataset::{Dataset, Sensor};
@@ -30,6 +31,7 @@ use crate::measurement::noise_floor::NoiseFloor;
 use crate::measurement::split::{self, Split};
 use nalgebra::{DMatrix, DVector};
 use std::cell::OnceCell;
+use std::f64::consts::FRAC_1_SQRT_2;
 use truegrind_arm::estimated::{
     Estimated, EstimatedParameter, Judgement, Provenance, Reason, ReasonKind, StageErrors, Verdict,
 };
@@ -219,7 +221,9 @@ impl Handover<'_> {
                 let scatter_mm = self.scatter.as_ref().map_or(0.0, JointScatter::rms_mm);
                 let inflation = inflation_from_errors(fitted, rows, &estimated.calibrated);
                 // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
-                benefit(fitted, rows, &estimated, &options.arm_tolerance, inflation)
+                let stated = options.arm_tolerance;
+                let tolerance = Tolerance { scale: stated.scale.and(self.scale_sigma()), ..stated };
+                benefit(fitted, rows, &estimated, &tolerance, inflation)
                     .map(|benefit| benefit.with_unmodelled(beyond_noise.at_least_scatter(scatter_mm)))
                     .map(|benefit| benefit.with_shift(arm.left_out.map_or(0.0, |out| out.apart.shape_mm)))
             }
@@ -246,14 +250,21 @@ impl Handover<'_> {
         rows.subset(&kept)
     }
 
-    /// A fit with the stated uncertainty of the sensor's scale.
+    /// A fit with the uncertainty of the sensor's scale.
     fn widened(&self, fit: &Extended) -> Fitted {
-        let SearchContext { subject, options, .. } = self.search.context;
         let mut fitted = Fitted::from(fit);
-        if let Some(sigma) = options.arm_tolerance.scale {
-            widen_by_scale(&mut fitted, &subject.observed.dataset, sigma);
+        if let Some(sigma) = self.scale_sigma() {
+            widen_by_scale(&mut fitted, &self.search.context.subject.observed.dataset, sigma);
         }
         fitted
+    }
+
+    /// Uncertainty of the sensor's scale: the stated one, or what a step of the scale shows. Of two sensors that differ by s either may be
+    /// right: with equal variances, the first is wrong by −s/2 ± s/2, in root mean square s/√2.
+    fn scale_sigma(&self) -> Option<f64> {
+        let steps = self.search.full_fit.causes.iter().filter_map(Cause::scale_step);
+        let shown = steps.map(|step| step.abs() * FRAC_1_SQRT_2);
+        shown.chain(self.search.context.options.arm_tolerance.scale).reduce(f64::max)
     }
 
     /// Errors of the causes that an arm cannot have.

@@ -225,6 +225,9 @@ fn describe_disturbance(
             format!("{} {rows}: {moved} or the base of the arm moved", shift())
         }
         (Kind::Target, _) => format!("{} {rows}: the hook or reflector slipped", shift()),
+        (Kind::Scale, Profile::Rows { .. }) => {
+            format!("{rows} {}: it is another sensor, or its constant was entered anew", shift())
+        }
         (Kind::Scale, _) => format!("the sensor's scale is wrong by {:.3} %", value * 100.0),
         (Kind::Sag, _) => {
             format!("the cable sags: weight over tension {:.4} per metre", value.max(0.0).sqrt())
@@ -266,6 +269,10 @@ fn what_shifted(
             format!("the sensor was displaced by {:.3} mm relative to the arm", at_target_mm(d, measured))
         }
         Kind::Target => format!("the target was displaced on the flange by {:.3} mm", norm(parameters)),
+        Kind::Scale => {
+            let side = if value < 0.0 { "shorter" } else { "longer" };
+            format!("the sensor reads lengths {:.3} % {side} than in the other rows", 100.0 * value.abs())
+        }
         _ => return None,
     })
 }
@@ -324,6 +331,22 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
         }
         EmpiricalFault::Drum { .. } => {
             "the cable's reading is not proportional to its length, as from a drum wound in layers".to_owned()
+        }
+        EmpiricalFault::CableReversal => format!(
+            "the cable's reading is {:.3} mm {} where the cable had paid out than where it had wound in",
+            value.abs(),
+            if value < 0.0 { "shorter" } else { "longer" }
+        ),
+        EmpiricalFault::Lens => {
+            let side = |k: usize, [more, less]: [&str; 2]| {
+                let percent = 100.0 * value_of(parameters, k);
+                format!("{:.2} % {}", percent.abs(), if percent < 0.0 { less } else { more })
+            };
+            format!(
+                "the camera's lens distorts: 45° beside its axis positions are read {} from the axis and {} from the camera",
+                side(0, ["further", "less far"]),
+                side(1, ["further", "less far"])
+            )
         }
         EmpiricalFault::Range { .. } => format!(
             "the sensor's distances are off by {:.3} mm and an amount that is not proportional to them: wrong reflector constant, or lens",
@@ -425,6 +448,8 @@ pub fn describe_pattern(cause: &Cause) -> String {
             "the residual is proportional to the reading, but not alike along the sensor's axes".to_owned()
         }
         SensorRange => "the residual follows the distance along the beam".to_owned(),
+        LensDistortion => "the residual grows with the distance from the camera's axis".to_owned(),
+        CableReversal => "the residual changes sign with the way in which the cable last moved".to_owned(),
         SensorScale => "the residual is proportional to the reading".to_owned(),
         CableSag => "the residual grows with the square of the cable's horizontal span".to_owned(),
         _ => "see the picture".to_owned(),
@@ -436,6 +461,10 @@ pub(super) fn remedy_of(cause: &Cause) -> &'static str {
     match cause.kind() {
         CauseKind::Backlash if cause.is_empirical() => {
             "adjust the gear mesh; the written model leaves it out, so keep programs away from poses at which the load changes sides"
+        }
+        CauseKind::SensorScale if cause.scale_step().is_some() => {
+            "measure a known length with the sensor of these rows and with that of the others: no row tells which of them is right, and the \
+             size of the arm follows the others"
         }
         CauseKind::ThermalDrift
             if matches!(cause, Cause::Measurement(Disturbance { kind: Kind::Zero, .. })) =>
@@ -511,6 +540,12 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         SensorAxes => "recalibrate the sensor, and check it against a length standard along each of its axes",
         SensorRange => {
             "check the reflector's constant and the sensor against a length standard at several distances"
+        }
+        LensDistortion => {
+            "calibrate the camera's lens again, or keep the target near the middle of the picture"
+        }
+        CableReversal => {
+            "approach each pose so that the cable always pays out; check its drum, guide and spring"
         }
         Latency => "record angles and readings with the same clock, or measure at rest",
         Unsettled => "wait longer before each reading",

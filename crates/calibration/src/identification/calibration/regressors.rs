@@ -181,6 +181,19 @@ pub fn sensor_shifts(
                 legendre(d, from_mm, to_mm).map(|p| u * p).to_vec()
             })
         }
+        EmpiricalFault::CableReversal => shift_columns(&|row, away| {
+            let Some(motion) = row.motion() else { return vec![Vector3::zeros()] };
+            let before = (posed.forward(&(row.joints - motion.step)) * target).coords - sensor(row);
+            let paid_out = (away.norm() - before.norm()).signum();
+            // A reading that is too long is a sensor that stands back.
+            vec![away.normalize() * (-0.5 * paid_out)]
+        }),
+        EmpiricalFault::Lens => shift_columns(&|_, away| {
+            let turn = frames.base_from_sensor.rotation;
+            let [x, y, z]: [f64; 3] = (turn.inverse() * away).into();
+            let square = (x * x + y * y) / (z * z);
+            [[x, y, 0.0], [0.0, 0.0, z]].map(|longer| turn * Vector3::from(longer) * -square).to_vec()
+        }),
         EmpiricalFault::Range { from_mm, to_mm } => shift_columns(&|_, away| {
             let u = away.normalize();
             vec![u, u * legendre(away.norm(), from_mm, to_mm)[0]]

@@ -100,6 +100,11 @@ pub enum EmpiricalFault {
         /// The longer length (mm).
         to_mm: u32,
     },
+    /// A cable sensor whose reading depends on the way in which the cable last moved: friction and lost motion of its drum.
+    CableReversal,
+    /// A camera whose lens distorts, with the square of the distance from its axis, the z axis of its frame: an image that is too large beside the
+    /// axis puts the target too far from the axis, and its marks too far apart, so that it seems nearer too. Radial distortion: Brown 1966.
+    Lens,
     /// Distances of a tracker or camera that are off by an amount not proportional to them: a constant, and the second Legendre polynomial of
     /// the distance between two distances. These are part of the fault, as with a drum.
     Range {
@@ -264,6 +269,8 @@ impl EmpiricalFault {
             }
             EmpiricalFault::Pulley => listed(&["xy", "yz", "zx", "x² − y²", "3z² − 1"], "mm"),
             EmpiricalFault::Drum { .. } => listed(&["square of the length", "cube of the length"], "mm"),
+            EmpiricalFault::CableReversal => listed(&["difference of both ways"], "mm"),
+            EmpiricalFault::Lens => listed(&["across at 45°", "along at 45°"], "1"),
             EmpiricalFault::Range { .. } => listed(&["constant", "square of the distance"], "mm"),
             EmpiricalFault::SensorAxes => listed(&["scale of x over z", "scale of y over z"], "1"),
             EmpiricalFault::TargetNest { second: false } => listed(&FIRST, "mm"),
@@ -291,7 +298,8 @@ impl EmpiricalFault {
             EmpiricalFault::TwoJointGear { .. } => 3e-4,
             EmpiricalFault::Refraction => 5e-6,
             EmpiricalFault::Pulley | EmpiricalFault::Drum { .. } => 0.5,
-            EmpiricalFault::Range { .. } => 0.2,
+            EmpiricalFault::Range { .. } | EmpiricalFault::CableReversal => 0.2,
+            EmpiricalFault::Lens => 0.02,
             EmpiricalFault::SensorAxes => 1e-3,
             EmpiricalFault::TargetNest { .. } => 0.05,
             // A reflector of 0.2 kg on 100 mm of a thin rod, of aluminium or steel; the slope of its end over a length of some 100 mm.

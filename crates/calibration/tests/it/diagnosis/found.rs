@@ -3,6 +3,7 @@
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 use truegrind_arm::robots;
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, SCHEMA};
 use truegrind_calibration::measurement::dataset::Sensor;
@@ -69,6 +70,48 @@ fn a_zero_that_jumped_is_told_with_its_rows() {
     assert!(!finding.alternatives.is_empty(), "what else was tried is shown");
     let offset = &finding.parameters[0];
     assert!((offset.value - 0.8).abs() < 3.0 * offset.sigma.unwrap());
+}
+
+#[test]
+fn a_second_draw_wire_of_another_scale_is_told_with_its_rows_and_widens_the_arm() {
+    let second = [Hidden::Scale { rows: Some([120, 299]), factor: 0.0015 }];
+    let out = outcome(&arm(), &second, &setup(Sensor::Cable, 300, 5));
+    expect(&out);
+    let finding = &out.diagnosed.diagnosis.findings[0];
+    assert_eq!((finding.effect, finding.rows), (CauseKind::SensorScale, Some([120, 299])));
+    assert_eq!(finding.confidence, Confidence::Identified);
+    let error = &finding.parameters[0];
+    assert!((error.value - 0.0015).abs() < 3.0 * error.sigma.unwrap(), "{error:?}");
+    // Which of the two wires is right, no row tells: the arm is as uncertain in size as they differ.
+    let expected = |hidden: &[Hidden]| {
+        let run = run(&arm(), hidden, &setup(Sensor::Cable, 300, 5));
+        let mut options = Options::default();
+        options.arm_tolerance.scale = Some(2e-4);
+        let frames = frames(&run.dataset, &arm());
+        let found = diagnose(&run.dataset, "arm", &arm(), &frames, &options, &|_| {}).unwrap();
+        found.benefit.unwrap().estimated_mm
+    };
+    let [of_two, of_one] = [expected(&second), expected(&[])];
+    assert!(of_two > of_one + 0.1, "{of_two} {of_one}");
+}
+
+#[test]
+fn a_cable_that_reads_longer_paid_out_is_told_from_readings_that_had_not_settled() {
+    let out = outcome(&arm(), &[Hidden::Reversal { mm: 0.3 }], &setup(Sensor::Cable, 300, 9));
+    expect(&out);
+    let finding = &out.diagnosed.diagnosis.findings[0];
+    assert_eq!(finding.confidence, Confidence::Identified, "{finding:?}");
+    let difference = &finding.parameters[0];
+    assert!((difference.value - 0.3).abs() < 4.0 * difference.sigma.unwrap(), "{difference:?}");
+}
+
+#[test]
+fn a_lens_that_distorts_is_told_from_axes_of_other_scales() {
+    let out = outcome(&arm(), &[Hidden::Lens { share: 0.02 }], &setup(Sensor::Position, 300, 10));
+    expect(&out);
+    let finding = &out.diagnosed.diagnosis.findings[0];
+    assert_eq!(finding.confidence, Confidence::Identified, "{finding:?}");
+    assert!((finding.parameters[0].value - 0.02).abs() < 0.002, "{:?}", finding.parameters);
 }
 
 #[test]

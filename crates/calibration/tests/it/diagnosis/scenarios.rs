@@ -42,10 +42,11 @@ pub const KINDS: [&str; 10] = [
 ];
 
 /// The same effects and more, as a log of a shop floor has them: what a name has behind its stroke says how.
-pub const FIELD: [&str; 11] = [
+pub const FIELD: [&str; 12] = [
     "thermal-drift/base",
     "thermal-drift/temperature",
     "sensor-scale",
+    "sensor-scale/second",
     "cable-sag",
     "payload-change",
     "joint-compliance/lean",
@@ -85,6 +86,12 @@ pub fn hide(kind: &str, rows: usize, rng: &mut ChaCha8Rng) -> Vec<Hidden> {
             Hidden::Drift { mm, time_constant_h: rng.random_range(0.4..2.0) }
         }
         "thermal-drift/temperature" => Hidden::Warm { growth_per_k: rng.random_range(2e-5..2e-4) },
+        "sensor-scale/second" => {
+            let Hidden::Zero { from, to, mm } = draw("sensor-zero-shift", rows, rng) else {
+                return Vec::new();
+            };
+            Hidden::Scale { rows: Some([from, to]), factor: 5e-4 * mm }
+        }
         "outliers" => {
             let mut list: Vec<usize> = (0..rows / 40).map(|_| rng.random_range(0..rows)).collect();
             list.sort_unstable();
@@ -138,7 +145,7 @@ pub fn draw(kind: &str, rows: usize, rng: &mut ChaCha8Rng) -> Hidden {
         "thermal-drift" => {
             Hidden::Thermal { growth: size * 2.5e-4, time_constant_h: rng.random_range(0.4..2.0) }
         }
-        "sensor-scale" => Hidden::Scale { factor: sign * size * 5e-4 },
+        "sensor-scale" => Hidden::Scale { rows: None, factor: sign * size * 5e-4 },
         "cable-sag" => Hidden::Sag { square_per_m2: rng.random_range(2e-3..1e-2) },
         "payload-change" => Hidden::Payload { from, to, kg: rng.random_range(1.0..5.0) },
         "sensor-zero-shift" => Hidden::Zero { from, to, mm: sign * size },
@@ -303,7 +310,10 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
             growth_per_k: 0.0,
             reference_c: 20.0,
         })),
-        Hidden::Scale { .. } => Cause::Measurement(Disturbance::new(Kind::Scale, Profile::Constant)),
+        Hidden::Scale { rows: when, .. } => {
+            let profile = when.map_or(Profile::Constant, |[from, to]| rows(from, to));
+            Cause::Measurement(Disturbance::new(Kind::Scale, profile))
+        }
         Hidden::Sag { .. } => Cause::Measurement(Disturbance::new(Kind::Sag, Profile::Constant)),
         Hidden::Payload { from, to, .. } => Cause::Measurement(Disturbance::new(
             Kind::Load { joints: vec![1, 2], compliance: None },
@@ -316,6 +326,8 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         | Hidden::Range { .. }
         | Hidden::Depth { .. }
         | Hidden::Droop { .. }
+        | Hidden::Reversal { .. }
+        | Hidden::Lens { .. }
         | Hidden::Tilt { .. }
         | Hidden::LoadedPlay { .. } => {
             return None;

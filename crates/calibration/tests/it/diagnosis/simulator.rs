@@ -108,8 +108,18 @@ pub enum Hidden {
     Warm {
         growth_per_k: f64,
     },
+    /// A sensor that reads too long, in all rows or, as a second one does, in some.
     Scale {
+        rows: Option<[usize; 2]>,
         factor: f64,
+    },
+    /// A cable sensor that reads longer by this where the cable has paid out.
+    Reversal {
+        mm: f64,
+    },
+    /// A camera 2.2 m above the arm that looks down: positions 45° beside its axis are read further from it by this share.
+    Lens {
+        share: f64,
     },
     /// A slack cable: weight per length over tension, squared (1/m²).
     Sag {
@@ -154,6 +164,8 @@ impl Hidden {
             Hidden::Drift { .. } | Hidden::Warm { .. } => "thermal-drift",
             Hidden::Scale { .. } => "sensor-scale",
             Hidden::Sag { .. } => "cable-sag",
+            Hidden::Reversal { .. } => "cable-reversal",
+            Hidden::Lens { .. } => "lens-distortion",
             Hidden::Payload { .. } => "payload-change",
             Hidden::Warp { .. } => "unexplained",
         }
@@ -181,6 +193,7 @@ impl Hidden {
             | Hidden::Frame { from, to, .. }
             | Hidden::Tool { from, to, .. }
             | Hidden::Payload { from, to, .. } => Some([*from, *to]),
+            Hidden::Scale { rows, .. } => *rows,
             _ => None,
         }
     }
@@ -387,7 +400,13 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
     let reach: f64 = nominal.links.iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum::<f64>() / 1000.0;
     let outlet =
         Vector3::new(900.0, draw.random_range(-300.0..300.0), draw.random_range(0.0..300.0)) * reach.max(1.0);
-    let (turn, place) = (draw.random_range(-3.0..3.0), Vector3::new(2200.0, -900.0, 400.0));
+    let camera = hidden.iter().any(|h| matches!(h, Hidden::Lens { .. }));
+    let place = if camera { Vector3::new(300.0, 0.0, 2200.0) } else { Vector3::new(2200.0, -900.0, 400.0) };
+    let turn = draw.random_range(-3.0..3.0);
+    let away_mm = |q: &Joints| {
+        let at = *arm.frames(&(arm.joint_map * q).into()).last().expect("six") * arm.flange * touched;
+        (at.xyz() - outlet).norm()
+    };
     let hours = 4.0;
     let n = setup.rows;
     let mut rows = Vec::with_capacity(n);
@@ -421,7 +440,7 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
             let mut turned = u;
             let (mut scale, mut zero) = (1.0, 0.0);
             let (mut stretched, mut slack, mut load, mut warp) = (1.0, 0.0, 0.0, 0.0);
-            let (mut range, mut depth) = (0.0, 0.0);
+            let (mut range, mut depth, mut lens, mut reversal) = (0.0, 0.0, 0.0, 0.0);
             let (mut moved, mut slipped) = (Vector3::zeros(), Vector4::zeros());
             for (k, h) in hidden.iter().enumerate().filter(|(k, _)| Some(*k) != skip) {
                 match h {
@@ -443,6 +462,8 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     }
                     Hidden::LostCounts { joint, until, rad } if i <= *until => turned[*joint] += rad,
                     Hidden::Range { mm } => range += mm,
+                    Hidden::Lens { share } => lens += share,
+                    Hidden::Reversal { mm } => reversal += mm,
                     Hidden::Depth { share } => depth += share,
                     Hidden::Thermal { growth, time_constant_h } => {
                         scale += growth * (1.0 - (-time / time_constant_h).exp());
@@ -463,7 +484,11 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     }
                     Hidden::Warm { growth_per_k } => scale += growth_per_k * kelvin,
                     Hidden::Warp { mm } => warp += mm,
-                    Hidden::Scale { factor } => stretched += factor,
+                    Hidden::Scale { rows, factor }
+                        if rows.is_none_or(|[from, to]| (from..=to).contains(&i)) =>
+                    {
+                        stretched += factor
+                    }
                     Hidden::Sag { square_per_m2 } => slack += square_per_m2,
                     Hidden::Payload { from, to, kg } if (*from..=*to).contains(&i) => load += kg,
                     _ => {}
@@ -511,11 +536,16 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     let chord = at - outlet - moved;
                     let (span_m, d) = (chord.xy().norm() * 1e-3, chord.norm());
                     let length = d * (1.0 + slack * span_m * span_m / 24.0);
-                    Reading::Cable((length + 7.0 + zero) * stretched)
+                    let paid_out = i > 0 && away_mm(q) > away_mm(&poses[i - 1]);
+                    let lag = if paid_out { reversal } else { 0.0 };
+                    Reading::Cable((length + 7.0 + zero + lag) * stretched)
                 }
                 _ => {
                     let away = at - place - moved;
-                    let away = away * (1.0 + range / away.norm());
+                    let mut away = away * (1.0 + range / away.norm());
+                    let beside = lens * away.xy().norm_squared() / (away.z * away.z);
+                    away.x *= 1.0 + beside;
+                    away.y *= 1.0 + beside;
                     let (s, c) = f64::sin_cos(turn);
                     Reading::Position(
                         Vector3::new(

@@ -143,8 +143,12 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
         EmpiricalFault::BaseTilt { load: Overturning::Lumps, axes: Some([0, 1]), deep: true },
     ];
     let of_sensor = match sensor {
-        Sensor::Cable => [EmpiricalFault::Pulley, EmpiricalFault::Drum { from_mm: 500, to_mm: 1200 }],
-        _ => [EmpiricalFault::SensorAxes, EmpiricalFault::TargetNest { second: true }],
+        Sensor::Cable => [
+            EmpiricalFault::Pulley,
+            EmpiricalFault::Drum { from_mm: 500, to_mm: 1200 },
+            EmpiricalFault::CableReversal,
+        ],
+        _ => [EmpiricalFault::SensorAxes, EmpiricalFault::TargetNest { second: true }, EmpiricalFault::Lens],
     };
     let of_motion = [
         EmpiricalFault::Latency { middle_s: 900 },
