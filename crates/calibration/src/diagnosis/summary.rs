@@ -1,5 +1,6 @@
 //! Summarises a search: findings of causes, data quality, and the unexplained residual.
 
+use super::cause::Cause;
 use super::cause_kind::CauseKind;
 use super::confounding::{Confounding, excess_over_noise_mm};
 use super::contribution::Contributions;
@@ -42,6 +43,15 @@ pub(super) struct Summary {
     pub(super) rounded_log: Option<RoundedLog>,
 }
 
+/// The scatter of repeated poses, where it is known: between the shifts that were found, or beside one that was not.
+fn repeats_beside_shifts(search: &Search<'_>) -> Option<NoiseFloor> {
+    let rows = without_outliers(search);
+    let shifted: Vec<[usize; 2]> = search.full_fit.causes.iter().filter_map(Cause::rows).collect();
+    let between = noise_floor::noise_floor_within(&rows, &shifted).filter(|_| !shifted.is_empty());
+    let known = |floor: Option<NoiseFloor>| floor.filter(NoiseFloor::is_known);
+    known(between).or_else(|| known(noise_floor::noise_floor_beside_shift(&rows)))
+}
+
 /// Summarises a search. `smoothed` is the held-out error without the smooth correction (mm), if there is one; `few_poses`: there are too few to
 /// separate effects from geometry.
 pub(super) fn summarise(
@@ -53,7 +63,7 @@ pub(super) fn summarise(
     let context = search.context;
     let (subject, searched, prepared) = (&context.subject, &context.searched, context.prepared);
     let (errors, outcome) = (&search.errors, &confirmed.outcome);
-    let floor = noise_floor::noise_floor_beside_shift(&without_outliers(search)).filter(NoiseFloor::is_known);
+    let floor = repeats_beside_shifts(search);
     let mut steps = vec![
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: errors.registered.random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: errors.geometric.random.rmse },

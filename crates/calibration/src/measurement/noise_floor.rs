@@ -69,6 +69,23 @@ pub fn noise_floor_beside_shift(data: &Dataset) -> Option<NoiseFloor> {
     Some(best.min_by(|a, b| at_most_mm(a).total_cmp(&at_most_mm(b))).unwrap_or(whole))
 }
 
+/// The noise floor where it is known in which of the ranges of row numbers (both ends included) something was shifted: repetitions count as
+/// such where the same ranges contain them.
+pub fn noise_floor_within(data: &Dataset, shifted: &[[usize; 2]]) -> Option<NoiseFloor> {
+    let mut states: BTreeMap<Vec<bool>, Vec<usize>> = BTreeMap::new();
+    for (i, row) in data.rows.iter().enumerate() {
+        let state = shifted.iter().map(|[from, to]| (from..=to).contains(&&row.number)).collect();
+        states.entry(state).or_default().push(i);
+    }
+    let floors = states.into_values().filter_map(|rows| noise_floor(&data.subset(&rows)));
+    let all = floors.fold(Scatter::default(), |sum, floor| Scatter {
+        square: sum.square + floor.freedom as f64 * floor.sigma_mm.powi(2),
+        poses: sum.poses + floor.poses,
+        freedom: sum.freedom + floor.freedom,
+    });
+    all.pooled()
+}
+
 /// Places of a shift that are tried.
 const MAX_CUTS: usize = 64;
 /// Fewest poses that were measured before and after a shift.

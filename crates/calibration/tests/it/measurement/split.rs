@@ -7,7 +7,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use truegrind_arm::model::Joints;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
-use truegrind_calibration::measurement::noise_floor::{noise_floor, noise_floor_beside_shift};
+use truegrind_calibration::measurement::noise_floor::{
+    noise_floor, noise_floor_beside_shift, noise_floor_within,
+};
 use truegrind_calibration::measurement::repeated_poses::poses;
 use truegrind_calibration::measurement::split::{self, Split};
 
@@ -164,6 +166,10 @@ fn a_shift_of_the_sensor_is_no_noise() {
         let [whole, beside] = [noise_floor(&data), noise_floor_beside_shift(&data)].map(Option::unwrap);
         assert!(whole.sigma_mm > 3.0 * true_mm, "seed {seed}: {whole:?}");
         assert!((beside.sigma_mm / true_mm - 1.0).abs() < 0.6, "seed {seed}: {beside:?}");
+        // Where the rows of the shift are known, the seven poses that were read before and after it do not count.
+        let within = noise_floor_within(&data, &[[56, 111]]).unwrap();
+        assert_eq!((within.poses, within.freedom), (5, 5), "poses that were read twice behind it");
+        assert!((within.sigma_mm / true_mm - 1.0).abs() < 0.9, "seed {seed}: {within:?}");
         // Noise alone, however large, is no shift.
         let noisy = repeated_at_the_end(seed, 200, 0.2);
         assert_eq!(noise_floor(&noisy), noise_floor_beside_shift(&noisy), "seed {seed}");
