@@ -280,12 +280,15 @@ fn only_one_file_opens_files_and_only_one_prints() {
             for word in OPENS.iter().chain(&PRINTS) {
                 assert!(!text.contains(word), "crates/{name}/src/{file} has {word}");
             }
-            assert!(*name == "pictures" || !text.contains("rerun::"), "crates/{name}/src/{file} names rerun");
+            assert!(
+                *name == "pictures" || !text.contains("re_sdk"),
+                "crates/{name}/src/{file} names Rerun's SDK"
+            );
         }
     }
     assert!(read > 50, "the sources are read");
     for (file, text) in code(&root().join("src")) {
-        assert!(!text.contains("rerun::"), "src/{file} names rerun");
+        assert!(!text.contains("re_sdk"), "src/{file} names Rerun's SDK");
         let opens = OPENS[1..].iter().find(|word| text.contains(**word));
         assert!(opens.is_none() || file.starts_with("cli/files"), "src/{file} has {}", opens.unwrap());
         // The ledger asks where stdout goes, the spinner draws itself.

@@ -8,8 +8,8 @@
 //! Joint effects and thermal growth move the frames, not the bodies.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use rerun::components::{Color, FillMode, RotationQuat, Translation3D};
-use rerun::{Capsules3D, Cylinders3D, Mesh3D, Points3D, Transform3D};
+use re_sdk_types::archetypes::{Capsules3D, Cylinders3D, Mesh3D, Points3D, Transform3D};
+use re_sdk_types::components::{Color, FillMode, RotationQuat, Translation3D};
 
 use super::colour::Rgba;
 use super::recording::{Store, VisualError};
@@ -179,7 +179,7 @@ fn shown(
         let drawn = Mesh3D::new(vertices)
             .with_vertex_normals(normals)
             .with_triangle_indices(mesh.triangles.triangles.iter().copied())
-            .with_albedo_factor(rerun::datatypes::Rgba32::from(paint.link));
+            .with_albedo_factor(re_sdk_types::datatypes::Rgba32::from(paint.link));
         store.fixed(format!("{path}/mesh{}", k + 1), &drawn)?;
     }
     Ok(!of_frame.is_empty())
@@ -244,7 +244,7 @@ fn translation(v: &Vector3<f64>) -> Translation3D {
 }
 
 fn quaternion(q: &UnitQuaternion<f64>) -> RotationQuat {
-    RotationQuat(rerun::Quaternion::from_xyzw(q.coords.map(|c| c as f32).into()))
+    RotationQuat(re_sdk_types::datatypes::Quaternion::from_xyzw(q.coords.map(|c| c as f32).into()))
 }
 
 /// A cylinder between two points.

@@ -1,7 +1,7 @@
 //! Curves and points over a time axis.
 
-use rerun::components::{Color, MarkerShape};
-use rerun::{Scalars, SeriesLines, SeriesPoints};
+use re_sdk_types::archetypes::{Scalars, SeriesLines, SeriesPoints};
+use re_sdk_types::components::{Color, MarkerShape};
 
 use super::colour::Rgba;
 use super::recording::{Store, VisualError};

@@ -1,7 +1,7 @@
 //! Colour bar.
 
-use rerun::components::{Color, Radius};
-use rerun::{LineStrips2D, Points2D};
+use re_sdk_types::archetypes::{LineStrips2D, Points2D};
+use re_sdk_types::components::{Color, Radius};
 
 use super::colour::{INTENDED, STEPS, Scale};
 use super::page::{Pane, View};

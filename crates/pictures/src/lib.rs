@@ -1,6 +1,6 @@
 //! 3D recordings over time for the Rerun viewer.
 //!
-//! The only crate that uses `rerun`, which does not appear in its API. It turns results into a [`Recording`], which is written as an
+//! The only crate that uses Rerun's SDK, which does not appear in its API. It turns results into a [`Recording`], which is written as an
 //! `.rrd` file or sent to a running viewer.
 //!
 //! - [`path`]: an arm that runs a program, before and after correction;

@@ -17,8 +17,8 @@ mod scene;
 mod words;
 
 use nalgebra::{Point3, Vector3};
-use rerun::components::{Color, MarkerShape, Radius};
-use rerun::{Boxes3D, LineStrips3D, Points3D, TransformAxes3D};
+use re_sdk_types::archetypes::{Boxes3D, LineStrips3D, Points3D, TransformAxes3D};
+use re_sdk_types::components::{Color, MarkerShape, Radius};
 
 use super::arm::{self, ArmState, Figure, LinkMesh, Paint};
 use super::colour::{BEFORE, INTENDED, JOINTS, REFUSED, Scale, after};
@@ -142,7 +142,7 @@ pub fn measured_recording(scene: &MeasuredScene<'_>) -> Result<Recording, Visual
         return Err(VisualError::Empty("the measurement file has no rows"));
     }
     let mut store = Store::default();
-    store.fixed("/", &rerun::ViewCoordinates::RIGHT_HAND_Z_UP())?;
+    store.fixed("/", &re_sdk_types::archetypes::ViewCoordinates::RIGHT_HAND_Z_UP())?;
     let flange_from_touched = scene.frames.map_or_else(Pose::identity, |f| f.flange_from_target);
     let state = |row: &Row| ArmState {
         time: row.number as i64,
@@ -171,7 +171,10 @@ pub fn measured_recording(scene: &MeasuredScene<'_>) -> Result<Recording, Visual
     if !scene.residuals.is_empty() {
         legend::draw(&mut store, &scale)?;
     }
-    store.fixed("summary", &rerun::TextDocument::from_markdown(words::markdown(scene, shape.as_ref())))?;
+    store.fixed(
+        "summary",
+        &re_sdk_types::archetypes::TextDocument::from_markdown(words::markdown(scene, shape.as_ref())),
+    )?;
     let page = layout(scene, &touched, shape.as_ref())?;
     Recording::new("truegrind measurements", &scene.dataset.file, store, page)
 }

@@ -4,18 +4,18 @@
 //! Views and containers are numbered in order.
 
 use nalgebra::{Point3, Vector3};
-use rerun::blueprint::components::{
-    ActiveTab, BackgroundKind, ColumnShare, ContainerKind, Corner2D, Enabled, Fps, IncludedContent,
-    PanelState, PlayState, RootContainer, RowShare, TimelineName, ViewClass,
-};
-use rerun::components::{Color, Name, Position3D, Range1D, Vector3D};
-use rerun::datatypes::{self, Float32, Float64, Range2D};
-use rerun::external::re_sdk_types::blueprint::archetypes::{
+use re_sdk::{AsComponents, SerializedComponentBatch};
+use re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, ScalarAxis,
     TextDocumentFormat, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisualBounds2D,
 };
-use rerun::external::re_sdk_types::blueprint::components::{AutoLayout, AutoViews, QueryExpression};
-use rerun::{AsComponents, SerializedComponentBatch};
+use re_sdk_types::blueprint::components::{
+    ActiveTab, BackgroundKind, ColumnShare, ContainerKind, Corner2D, Enabled, Fps, IncludedContent,
+    PanelState, PlayState, RootContainer, RowShare, TimelineName, ViewClass,
+};
+use re_sdk_types::blueprint::components::{AutoLayout, AutoViews, QueryExpression};
+use re_sdk_types::components::{Color, Name, Position3D, Range1D, Vector3D};
+use re_sdk_types::datatypes::{self, Float32, Float64, Range2D};
 
 use super::colour::Rgba;
 use super::recording::{Store, VisualError};
@@ -78,8 +78,10 @@ impl View {
 
     /// A 2D view over `x` and `y`, y downwards.
     pub(super) fn flat(name: impl Into<String>, shows: &[&str], x: [f64; 2], y: [f64; 2]) -> Self {
-        let bounds =
-            rerun::blueprint::components::VisualBounds2D(Range2D { x_range: x.into(), y_range: y.into() });
+        let bounds = re_sdk_types::blueprint::components::VisualBounds2D(Range2D {
+            x_range: x.into(),
+            y_range: y.into(),
+        });
         Self::new("2D", name, shows).with("VisualBounds2D", &VisualBounds2D::new(bounds)).with(
             "Background",
             &Background::new(BackgroundKind::SolidColor).with_color(Color::from(BACKGROUND)),

@@ -46,7 +46,7 @@ const POINTS_PER_SECOND: f64 = 15.0;
 pub fn path_recording(scene: &PathScene<'_>) -> Result<Recording, VisualError> {
     let plan = Plan::of(scene)?;
     let mut store = Store::default();
-    store.fixed("/", &rerun::ViewCoordinates::RIGHT_HAND_Z_UP())?;
+    store.fixed("/", &re_sdk_types::archetypes::ViewCoordinates::RIGHT_HAND_Z_UP())?;
     arms(&mut store, scene, &plan)?;
     lines::draw(&mut store, scene, &plan)?;
     curves::draw(&mut store, scene, &plan)?;

@@ -7,24 +7,24 @@
 use std::path::Path;
 use std::time::Duration;
 
-use rerun::external::re_log_encoding::Encoder;
-use rerun::external::re_log_types::external::re_tuid::Tuid;
-use rerun::external::re_log_types::{
+use re_sdk::external::re_log_encoding::Encoder;
+use re_sdk::external::re_log_types::external::re_tuid::Tuid;
+use re_sdk::external::re_log_types::{
     BlueprintActivationCommand, LogMsg, SetStoreInfo, StoreInfo, StoreSource, TimePoint,
 };
-use rerun::external::re_types_core::{ChunkId, RowId};
-use rerun::log::{Chunk, TimeColumn};
-use rerun::sink::{GrpcSink, LogSink};
-use rerun::{
+use re_sdk::log::{Chunk, TimeColumn};
+use re_sdk::sink::{GrpcSink, LogSink};
+use re_sdk::{
     AsComponents, EntityPath, RecordingInfo, SerializedComponentBatch, SerializedComponentColumn, StoreId,
     StoreKind,
 };
+use re_sdk_types::external::re_types_core::{ChunkId, RowId};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 use truegrind_math::digest::hex;
 
 /// Default address of a Rerun viewer.
-pub const VIEWER: &str = rerun::DEFAULT_CONNECT_URL;
+pub const VIEWER: &str = re_sdk::DEFAULT_CONNECT_URL;
 
 /// Timeout for a viewer to accept a recording.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -98,8 +98,8 @@ impl Recording {
     /// [`VisualError::Start`] and [`VisualError::Viewer`].
     pub fn spawn(&self) -> Result<(), VisualError> {
         let options =
-            rerun::SpawnOptions { wait_for_bind: true, hide_welcome_screen: true, ..Default::default() };
-        rerun::spawn(&options).map_err(|e| VisualError::Start(first_line(&e.to_string())))?;
+            re_sdk::SpawnOptions { wait_for_bind: true, hide_welcome_screen: true, ..Default::default() };
+        re_sdk::spawn(&options).map_err(|e| VisualError::Start(first_line(&e.to_string())))?;
         self.connect(VIEWER)
     }
 
@@ -108,13 +108,13 @@ impl Recording {
     /// # Errors
     /// [`VisualError::Start`].
     pub fn open(file: &Path) -> Result<(), VisualError> {
-        let options = rerun::SpawnOptions {
+        let options = re_sdk::SpawnOptions {
             new: true,
             hide_welcome_screen: true,
             extra_args: vec![file.display().to_string()],
             ..Default::default()
         };
-        rerun::spawn(&options).map(drop).map_err(|e| VisualError::Start(first_line(&e.to_string())))
+        re_sdk::spawn(&options).map(drop).map_err(|e| VisualError::Start(first_line(&e.to_string())))
     }
 
     /// Combines content and layout. `application` separates the layouts of different kinds of recordings.
@@ -197,7 +197,7 @@ impl Store {
         (axis, time): (&'static str, i64),
         batches: impl IntoIterator<Item = SerializedComponentBatch>,
     ) -> Result<(), VisualError> {
-        let axis = rerun::Timeline::new_sequence(axis);
+        let axis = re_sdk::Timeline::new_sequence(axis);
         self.row(path, TimePoint::default().with(axis, time), batches)
     }
 

@@ -1,6 +1,6 @@
 //! Curves over the path: deviation along the normal, its size, the angle, and the change of the joints.
 
-use rerun::components::MarkerShape;
+use re_sdk_types::components::MarkerShape;
 
 use super::scene::{AXIS, PathScene, Plan};
 use crate::colour::{BEFORE, FLAGGED, JOINTS, REFUSED, SIGMA, after};

@@ -1,8 +1,8 @@
 //! Objects in the 3D view: workpiece, paths, tool axes, marks, colour bar.
 
 use nalgebra::{Point3, Vector3};
-use rerun::components::{Color, Radius};
-use rerun::{Arrows3D, LineStrips3D, Mesh3D, Points3D};
+use re_sdk_types::archetypes::{Arrows3D, LineStrips3D, Mesh3D, Points3D};
+use re_sdk_types::components::{Color, Radius};
 
 use super::scene::{PathScene, Plan, intended, reached};
 use crate::colour::{BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, TOOL, TRAVEL, WORKPIECE, after};

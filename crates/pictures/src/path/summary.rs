@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use rerun::TextDocument;
+use re_sdk_types::archetypes::TextDocument;
 
 use super::scene::{PathScene, Plan};
 use crate::markdown::{cell, line, number};

@@ -1,9 +1,9 @@
 //! The picture of a measurement file.
 
 use nalgebra::{Point3, Vector3};
-use rerun::components::Scalar;
-use rerun::components::{Color, LineStrip3D};
-use rerun::{LineStrips3D, Points3D, Scalars};
+use re_sdk_types::archetypes::{LineStrips3D, Points3D, Scalars};
+use re_sdk_types::components::Scalar;
+use re_sdk_types::components::{Color, LineStrip3D};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_calibration::diagnosis::diagnose;
@@ -101,7 +101,8 @@ fn rows_sensor_and_residuals_are_drawn() {
     assert!((after[29].1[0].0.0 - 0.95).abs() < 1e-12);
     assert_eq!(read.values::<Scalar>("/residual/held_out", &Scalars::descriptor_scalars()).len(), 2);
     assert_eq!(
-        read.fixed::<rerun::Text>("/set_aside", &Points3D::descriptor_labels())[0].to_string(),
+        read.fixed::<re_sdk_types::components::Text>("/set_aside", &Points3D::descriptor_labels())[0]
+            .to_string(),
         "row 29 set aside"
     );
     // Colours follow the size of the last stage: row 10 has none, row 29 the most.
@@ -142,7 +143,8 @@ fn a_file_alone_is_a_picture_too() {
     assert!(entities.contains("/touched") && entities.contains("/joints/1"));
     assert!(!entities.iter().any(|e| e.starts_with("/legend") || e.starts_with("/residual")), "{entities:?}");
     // Without frames the points are the flange's.
-    let points = read.fixed::<rerun::Position3D>("/touched", &Points3D::descriptor_positions());
+    let points =
+        read.fixed::<re_sdk_types::components::Position3D>("/touched", &Points3D::descriptor_positions());
     let flange = arm.forward(&dataset.rows[5].joints, &Condition::default()).translation.vector;
     assert!((Vector3::new(points[5].x(), points[5].y(), points[5].z()).cast::<f64>() - flange).norm() < 1e-3);
 }

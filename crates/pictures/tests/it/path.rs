@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use rerun::components::{Color, LineStrip3D, RotationQuat, Translation3D};
-use rerun::{LineStrips3D, Mesh3D, Points3D, Transform3D};
+use re_sdk_types::archetypes::{LineStrips3D, Mesh3D, Points3D, Transform3D};
+use re_sdk_types::components::{Color, LineStrip3D, RotationQuat, Translation3D};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
@@ -145,7 +145,9 @@ fn read(parts: &Parts) -> Read {
 
 fn strips(read: &Read, entity: &str) -> Vec<Vec<Point3<f64>>> {
     let strips = read.fixed::<LineStrip3D>(entity, &LineStrips3D::descriptor_strips());
-    let point = |p: &rerun::Vec3D| Point3::new(f64::from(p.x()), f64::from(p.y()), f64::from(p.z()));
+    let point = |p: &re_sdk_types::datatypes::Vec3D| {
+        Point3::new(f64::from(p.x()), f64::from(p.y()), f64::from(p.z()))
+    };
     strips.iter().map(|s| s.0.iter().map(point).collect()).collect()
 }
 
@@ -315,7 +317,8 @@ fn meshes_are_drawn_in_the_frames_that_they_move_with() {
         }
     }
     let entity = "/arm/after/link1/link2/mesh1";
-    let vertices = read.fixed::<rerun::Position3D>(entity, &Mesh3D::descriptor_vertex_positions());
+    let vertices =
+        read.fixed::<re_sdk_types::components::Position3D>(entity, &Mesh3D::descriptor_vertex_positions());
     let first = Vector3::new(vertices[0].x(), vertices[0].y(), vertices[0].z()).cast::<f64>();
     assert!((first - (pose * parts.triangles.vertices_mm[0]).coords).norm() < 1e-3);
 }
@@ -376,8 +379,8 @@ fn coloured_paths_lie_where_the_tool_goes_in_the_colours_of_the_scale() {
 #[test]
 fn the_part_stands_in_the_base() {
     let parts = scene_parts();
-    let vertices =
-        read(&parts).fixed::<rerun::Position3D>("/workpiece", &Mesh3D::descriptor_vertex_positions());
+    let vertices = read(&parts)
+        .fixed::<re_sdk_types::components::Position3D>("/workpiece", &Mesh3D::descriptor_vertex_positions());
     assert_eq!(vertices.len(), parts.triangles.vertices_mm.len());
     let first = parts.base_from_object * parts.triangles.vertices_mm[0];
     let drawn = Point3::new(vertices[0].x(), vertices[0].y(), vertices[0].z()).cast::<f64>();
@@ -411,7 +414,7 @@ fn a_label_stands_beside_the_path() {
     let (low, high) = cut.iter().fold((cut[0], cut[0]), |(low, high), p| (low.inf(p), high.sup(p)));
     let (middle, radius) = (nalgebra::center(&low, &high), 0.5 * (high - low).norm());
     let read = read(&parts);
-    let at = read.fixed::<rerun::components::Position3D>(
+    let at = read.fixed::<re_sdk_types::components::Position3D>(
         "/exaggerated/largest/before/label",
         &Points3D::descriptor_positions(),
     );
@@ -432,7 +435,7 @@ fn marked_points_are_labelled_by_line_and_reason_once_for_each_run() {
     let read = read(&parts);
     let labels = |name: &str| {
         let entity = format!("/marks/{name}/labels");
-        read.fixed::<rerun::Text>(&entity, &Points3D::descriptor_labels())
+        read.fixed::<re_sdk_types::components::Text>(&entity, &Points3D::descriptor_labels())
             .iter()
             .map(|t| t.to_string())
             .collect::<Vec<_>>()

@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rerun::external::re_log_encoding::Decoder;
-use rerun::external::re_log_types::LogMsg;
-use rerun::log::Chunk;
-use rerun::{Component, ComponentDescriptor, StoreKind};
+use re_sdk::external::re_log_encoding::Decoder;
+use re_sdk::external::re_log_types::LogMsg;
+use re_sdk::log::Chunk;
+use re_sdk::{Component, ComponentDescriptor, StoreKind};
 
 /// What a file holds.
 pub(crate) struct Read {
@@ -95,20 +95,23 @@ impl Read {
 
     /// The text of the summary.
     pub(crate) fn summary(&self) -> String {
-        let text = self.fixed::<rerun::Text>("/summary", &rerun::TextDocument::descriptor_text());
+        let text = self.fixed::<re_sdk_types::components::Text>(
+            "/summary",
+            &re_sdk_types::archetypes::TextDocument::descriptor_text(),
+        );
         text[0].to_string()
     }
 
     /// Display names of the views of the page, with their class.
     pub(crate) fn views(&self) -> Vec<(String, String)> {
-        use rerun::external::re_sdk_types::blueprint::archetypes::ViewBlueprint;
-        use rerun::external::re_sdk_types::blueprint::components::ViewClass;
+        use re_sdk_types::blueprint::archetypes::ViewBlueprint;
+        use re_sdk_types::blueprint::components::ViewClass;
         let text = |chunk: &Chunk| {
             let class = chunk
                 .component_batch::<ViewClass>(ViewBlueprint::descriptor_class_identifier().component, 0)?
                 .unwrap();
             let name = chunk
-                .component_batch::<rerun::components::Name>(
+                .component_batch::<re_sdk_types::components::Name>(
                     ViewBlueprint::descriptor_display_name().component,
                     0,
                 )?
