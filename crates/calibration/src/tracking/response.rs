@@ -349,6 +349,7 @@ impl Tracker {
         self.filter = filter;
         let poses = std::mem::take(&mut self.state.history);
         let problem = self.problem(&poses);
+        let forgotten = self.state.poses - poses.len();
         let single = found.together.is_none();
         let bound = outlier_bound(self.state.sensor.scalars());
         // What moves the readings exactly as the sensor does is the sensor: see `compare_changes`.
@@ -388,7 +389,8 @@ impl Tracker {
             if poses[at].begins_station {
                 self.release_sensor();
             }
-            let taken = !self.update(&problem, at).set_aside;
+            let registered = self.registered(forgotten + at);
+            let taken = !self.update_about(&problem, at, registered.as_ref()).set_aside;
             if taken && !(poses[at].nis <= bound) {
                 self.state.outliers = self.state.outliers.saturating_sub(1);
                 extend_region(&mut self.state.region, &poses[at].joints);

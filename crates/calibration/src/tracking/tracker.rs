@@ -308,7 +308,8 @@ impl Tracker {
     ) -> Option<Alarm> {
         record.predicted_mm =
             Some(self.error_mm(problem, at, record.per_mm).abs()).filter(|mm| mm.is_finite());
-        let taken = self.update(problem, at);
+        let registered = self.registered(self.state.poses);
+        let taken = self.update_about(problem, at, registered.as_ref());
         record.nis = taken.nis;
         self.state.poses += 1;
         self.state.outliers += usize::from(taken.set_aside);
@@ -350,11 +351,21 @@ impl Tracker {
     /// Filters observation `pose` of `problem`: process noise, linearisation, one update per row. This is the whole cost of a
     /// pose apart from an alarm.
     pub fn update(&mut self, problem: &CalibrationProblem, pose: usize) -> PoseUpdate {
+        self.update_about(problem, pose, None)
+    }
+
+    /// The same, linearised at a state that is known better than the filter's own as yet.
+    pub(super) fn update_about(
+        &mut self,
+        problem: &CalibrationProblem,
+        pose: usize,
+        known: Option<&DVector<f64>>,
+    ) -> PoseUpdate {
         let (p, per) = (self.parameters.len(), problem.rows_per_observation());
         self.filter.predict(&self.drift);
         let mut trial = self.filter.clone();
         let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
-        let at = trial.x.clone();
+        let at = known.unwrap_or(&trial.x).clone();
         problem.jacobian(at.as_slice(), pose * per..(pose + 1) * per, &mut r, &mut j);
         let mut a = DVector::zeros(p);
         let mut nis = 0.0;
@@ -372,6 +383,13 @@ impl Tracker {
             self.filter = trial;
         }
         PoseUpdate { nis, set_aside }
+    }
+
+    /// Where pose `number` of the track is linearised, if it is one of those that registered the sensor: where they put it together. Each by
+    /// itself leaves outlet, zero and target open by centimetres; a filter that follows them there is linearised elsewhere at every
+    /// pose, and counts as known what no reading tells.
+    pub(super) fn registered(&self, number: usize) -> Option<DVector<f64>> {
+        (number < self.state.options.first_poses).then(|| DVector::zeros(self.parameters.len()))
     }
 
     pub(super) fn problem(&self, poses: &[PoseRecord]) -> CalibrationProblem {
