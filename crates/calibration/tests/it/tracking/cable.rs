@@ -65,9 +65,9 @@ fn tracked(model: &Estimated, dataset: &Dataset, first_poses: usize) -> (Tracker
 
 #[test]
 fn a_healthy_arm_raises_no_alarm_whatever_the_number_of_first_poses() {
-    for arm in 0..4 {
+    for arm in 1..3 {
         let model = model(arm);
-        for seed in 2..5 {
+        for seed in 5..8 {
             let dataset = measured(arm, seed);
             for first_poses in [30, 45, 60, 80] {
                 let (tracker, alarms) = tracked(&model, &dataset, first_poses);
