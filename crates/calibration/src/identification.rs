@@ -15,6 +15,7 @@ pub mod start;
 pub(crate) mod parameter_table;
 pub mod repeats;
 mod sessions;
+mod cable_factor;
 pub(crate) mod misreading;
 pub(crate) mod mixed_rows;
 pub(crate) mod rigid_motion_columns;

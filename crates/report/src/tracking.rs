@@ -100,7 +100,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     if set_aside.is_some() || tracker.mostly_set_aside() {
         reasons.push(DO_NOT_FIT.to_owned());
     } else if status == Status::Warning {
-        reasons.push(what_to_do(departed).to_owned());
+        reasons.push(what_to_do(alarms, departed).to_owned());
     }
     reasons.extend(gain.as_ref().map(gain_sentence));
     reasons.extend(noise_sentences(tracker));
@@ -193,8 +193,12 @@ fn headline(
 }
 
 /// What to do about a change.
-fn what_to_do(departed: Option<&Departure>) -> &'static str {
+fn what_to_do(alarms: &[Alarm], departed: Option<&Departure>) -> &'static str {
     match departed {
+        None if !alarms.is_empty() && alarms.iter().all(Alarm::is_of_scale) => {
+            "what to do: measure a known length with the sensor, and put its scale right (of a draw-wire the millimetres per count); the programs \
+             remain what they were. Begin a new track then (--state)"
+        }
         Some(now) if !now.is_of_shape && !has_turned(now) => {
             "what to do: check the mark of joint 6 and touch a known point with the tool. If they are right, the reflector moved: begin a new \
              track (--state). If not, measure the arm, identify it, and compensate the original programs again"
@@ -334,8 +338,33 @@ fn which_moved(alarms: &[Alarm], departed: Option<&Departure>) -> Vec<String> {
          have moved, it was the sensor, and the programs are right; if not, it was the base, and programs on parts next to the arm are off"
             .to_owned()
     });
-    target.into_iter().chain(sensor).collect()
+    let scale = alarms.iter().find(|alarm| alarm.is_of_scale()).map(scale_sentence);
+    target.into_iter().chain(sensor).chain(scale).collect()
 }
+
+/// What a changed scale of the sensor may be.
+fn scale_sentence(alarm: &Alarm) -> String {
+    let long = if alarm.shift < 0.0 { "short" } else { "long" };
+    let kelvin = alarm.shift.abs() / GROWTH_PER_K;
+    let warmed = if kelvin > MOST_WARMED_K {
+        String::new()
+    } else {
+        format!(
+            ", unless the whole arm is warmer or colder by some {kelvin:.0} K than when it was measured: then programs are off by what it grew"
+        )
+    };
+    format!(
+        "the scale of the sensor: it reads {:.3} % too {long} against how it read before, as after an exchange of sensor or encoder; the arm in the \
+         model for programs stays as it was{warmed}",
+        100.0 * alarm.shift.abs()
+    )
+}
+
+/// Growth of steel and aluminium per kelvin is 12 and 24 µm/m: between the two.
+const GROWTH_PER_K: f64 = 1.8e-5;
+
+/// An arm does not warm by more (K).
+const MOST_WARMED_K: f64 = 60.0;
 
 /// How far the arm has moved, and its parameters that moved most.
 fn departure_sentence(now: &Departure) -> String {
@@ -399,10 +428,12 @@ pub fn table(tracker: &Tracker) -> Table {
         ],
     );
     let sigmas = tracker.sigmas();
-    for ((parameter, value), sigma) in tracker.parameters().iter().zip(tracker.deviations()).zip(sigmas) {
+    for (k, ((parameter, value), sigma)) in
+        tracker.parameters().iter().zip(tracker.deviations()).zip(sigmas).enumerate()
+    {
         let (scale, unit) = display_unit(parameter.unit());
         table.push([
-            parameter.to_string().into(),
+            tracker.name(k).into(),
             unit.into(),
             Cell::with_sigma(value * scale, Some(sigma * scale)),
         ]);
@@ -419,8 +450,9 @@ pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
         .iter()
         .zip(tracker.deviations())
         .zip(&sigmas)
-        .map(|((p, value), sigma)| {
-            json!({ "name": p.to_string(), "unit": p.unit(), "deviation": value, "sigma": sigma })
+        .enumerate()
+        .map(|(k, ((p, value), sigma))| {
+            json!({ "name": tracker.name(k), "unit": p.unit(), "deviation": value, "sigma": sigma })
         })
         .collect();
     json!({

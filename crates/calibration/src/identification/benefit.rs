@@ -194,13 +194,15 @@ fn expected_benefit(
     let gradient = &metric * &x;
     let square = x.dot(&gradient);
     let correction = Correction { metric: &metric, x: &x, gradient: &gradient, square, variance_inflation };
-    let judged = |with_objections: bool| {
+    let judged_under = |tolerance: &Tolerance, with_objections: bool| {
         let alternatives = alternatives(fitted, tolerance, &readings, with_objections);
         let hypotheses = hypotheses(fitted, tolerance, &alternatives);
         let posteriors = weighted_posteriors(&hypotheses, &alternatives, &readings, &correction)?;
         averaged(&posteriors, fitted, tolerance, &readings)
     };
-    let plain = judged(false)?;
+    let judged = |with_objections: bool| judged_under(tolerance, with_objections);
+    let judged_exactly = || judged_under(&Tolerance { scale: Some(0.0), ..*tolerance }, false);
+    let plain = with_exact_scale(judged(false)?, tolerance, &judged_exactly);
     if !readings.laws.iter().any(|(law, _)| law.is_objection()) {
         return Some(plain);
     }
@@ -216,6 +218,24 @@ fn is_raised(objected: &Benefit, plain: &Benefit) -> bool {
     let is_likely = objected.law.is_some_and(|law| law.probability > 0.5);
     let raises_doubt = plain.probability >= MIN_PROBABILITY && scale <= 0.95;
     objected.probability < MIN_PROBABILITY && (raises_doubt || (is_likely && scale <= 0.5))
+}
+
+/// Adds to a doubtful benefit under a stated uncertainty of the scale, which all of its models have, what it were if the scale were exact: that
+/// tells whether a known length would help, or only more poses.
+fn with_exact_scale(
+    plain: Benefit,
+    tolerance: &Tolerance,
+    judged_exactly: &dyn Fn() -> Option<Benefit>,
+) -> Benefit {
+    let is_asked = plain.probability < MIN_PROBABILITY && tolerance.scale.is_some_and(|sigma| sigma > 0.0);
+    match is_asked.then(judged_exactly).flatten() {
+        Some(exact) => Benefit {
+            probability_without_scale: exact.probability,
+            estimated_without_scale_mm: exact.estimated_mm,
+            ..plain
+        },
+        None => plain,
+    }
 }
 
 /// The benefit under all models together.

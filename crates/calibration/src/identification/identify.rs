@@ -294,7 +294,8 @@ pub fn identify(
     })
 }
 
-/// The fit of geometry to all rows that [`identify`] writes, without what states its error: no row is held out.
+/// The fit of geometry to all rows that [`identify`] writes, without what states its error: no row is held out, and its covariance holds nothing of
+/// the sensor's scale.
 ///
 /// `split` are the rows on which [`identify`] judges whether the readings are of this arm.
 ///
@@ -318,7 +319,7 @@ pub(crate) fn fit_geometry(
     stages.registered_own(&training).map_err(|found| found.error(dataset, robot, nominal))?;
     report_step("fitting all rows");
     let registered = stages.registered(&observed);
-    Ok(stages.widened_geometry(&observed, &registered))
+    Ok(stages.geometry(&observed, &registered))
 }
 
 /// The rows as they are fitted, without outliers, which are the same for every method.

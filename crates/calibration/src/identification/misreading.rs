@@ -2,10 +2,12 @@
 //! in another unit, a reading were missing, or each session had its own set-up.
 //!
 //! Each hypothesis is judged by the closed form for sensor frame and target with the nominal arm, since a wrong file is off by more than any
-//! arm's tolerance. Tracker positions only: a cable's single length fits too much.
+//! arm's tolerance. Most are of tracker positions only: a cable's single length fits too much. Of a cable, counts in place of millimetres and readings
+//! that fall as it leaves are told: they are one factor for all lengths.
 
 use nalgebra::Vector3;
 
+use super::cable_factor;
 use super::calibration::{CalibrationProblem, Frames, Weight};
 use super::start::candidate_frames;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
@@ -46,6 +48,9 @@ pub(crate) fn advice(explanation: Option<&str>) -> String {
 
 /// What else the readings may be, in a sentence part; `None` where nothing explains them.
 pub(crate) fn explanation(dataset: &Dataset, nominal: &Model) -> Option<String> {
+    if dataset.sensor == Sensor::Cable {
+        return cable_factor::explanation(dataset, nominal);
+    }
     if dataset.sensor != Sensor::Position || dataset.rows.len() < 2 * MIN_ROWS {
         return None;
     }

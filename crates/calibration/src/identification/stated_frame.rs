@@ -174,7 +174,11 @@ fn fitted_beside(
 ) -> Option<Fitted> {
     let options = Options { tolerance, ..Options::default() };
     let split = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
-    fit_geometry(dataset, "", nominal, frames, &split, &options).ok()
+    let mut geometry = fit_geometry(dataset, "", nominal, frames, &split, &options).ok()?;
+    if let Some(sigma) = tolerance.scale {
+        widen_by_scale(&mut geometry, dataset, sigma);
+    }
+    Some(geometry)
 }
 
 /// What speaks against the stated frame, whose standard deviation is `sigma_mm`, beside the frame `found` from the readings of the arm

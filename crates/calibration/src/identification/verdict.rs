@@ -154,6 +154,8 @@ impl VerdictBuilder {
             return;
         }
         match &found.scale {
+            // Every model has a stated scale: it says nothing of whether there is an error.
+            Some(_) if found.scale_stated => self.doubt(stated_scale_sentence(found, sensor)),
             Some(scale) if scale.probability > 0.5 => self.doubt(scale_sentence(scale, sensor)),
             Some(scale) => self.doubt(format!(
                 "these rows cannot distinguish a sensor scale error of {} from longer links: {}",
@@ -284,6 +286,16 @@ fn scale_sentence(scale: &ScaleError, sensor: Sensor) -> String {
         100.0 * error,
         100.0 * scale.sigma,
         percent_of(scale.probability),
+        remedy(sensor)
+    )
+}
+
+/// That a scale is known too little for what the poses tell.
+fn stated_scale_sentence(found: &Benefit, sensor: Sensor) -> String {
+    format!(
+        "the scale of the sensor is known too little (--sensor-scale-sigma): the same readings with an exact scale would improve programs with a \
+         probability of {}, and more poses do not tell it from longer links: {}",
+        percent_of(found.probability_without_scale),
         remedy(sensor)
     )
 }

@@ -3,6 +3,8 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+
+use super::scale::SCALE_NAME;
 use truegrind_arm::parameter::{Parameter, display_unit};
 
 /// One of several parameters that moved at once.
@@ -116,6 +118,11 @@ pub struct Alarm {
 }
 
 impl Alarm {
+    /// Whether it is of the sensor's scale.
+    pub fn is_of_scale(&self) -> bool {
+        self.parameter == SCALE_NAME
+    }
+
     /// Whether `mount` moved as a whole.
     pub fn is_of(&self, mount: Mount) -> bool {
         self.parameter == mount.to_string()
@@ -158,7 +165,7 @@ impl Alarm {
 
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (scale, unit) = display_unit(&self.unit);
+        let (scale, unit) = if self.is_of_scale() { (100.0, "%") } else { display_unit(&self.unit) };
         if self.course == Course::Burst {
             return write!(
                 f,

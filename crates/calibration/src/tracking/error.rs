@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use crate::identification::misreading::OTHER_ARM_MM;
 use crate::identification::start::StartError;
+use crate::measurement::dataset::Sensor;
 
 /// Why an arm cannot be tracked.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -29,11 +30,13 @@ pub enum TrackError {
     #[error(
         "{file}: under this model the first {poses} poses leave {left_mm:.3} mm RMS along each axis, where its held-out error was \
          {held_out_mm:.3} mm along each: {}",
-        what_to_do(*left_mm, *changed_mm)
+        what_to_do(*left_mm, *changed_mm, *sensor)
     )]
     Foreign {
         /// File.
         file: String,
+        /// Sensor.
+        sensor: Sensor,
         /// Poses that placed the sensor.
         poses: usize,
         /// RMS residual of one coordinate or length (mm).
@@ -102,7 +105,7 @@ pub enum StateError {
     },
 }
 
-fn what_to_do(left_mm: f64, changed_mm: Option<f64>) -> String {
+fn what_to_do(left_mm: f64, changed_mm: Option<f64>, sensor: Sensor) -> String {
     if left_mm > OTHER_ARM_MM {
         return "these are not measurements of this arm, or their units or columns are wrong".to_owned();
     }
@@ -112,7 +115,16 @@ fn what_to_do(left_mm: f64, changed_mm: Option<f64>) -> String {
              the new model"
         );
     }
+    // One zero is fitted to all of them.
+    let set_anew = match sensor {
+        Sensor::Cable => {
+            ". If the zero of the cable was set anew between visits, a track follows it from some 30 poses a visit on, with an alarm at each \
+             (--first-poses: no more than the first visit has)"
+        }
+        Sensor::Position | Sensor::Pose => "",
+    };
     format!(
-        "no other geometry explains them, so the readings scatter more, or they are not of this arm: check sensor, target and load; --sigma {left_mm:.3} starts anyway, and finds larger changes only"
+        "no other geometry explains them, so the readings scatter more, or they are not of this arm: check sensor, target and load; --sigma \
+         {left_mm:.3} starts anyway, and finds larger changes only{set_anew}"
     )
 }

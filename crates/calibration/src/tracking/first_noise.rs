@@ -72,6 +72,7 @@ impl FirstPoses {
             if left_mm > FOREIGN * unexplained_mm && left_mm > FOREIGN_MM {
                 return Err(TrackError::Foreign {
                     file: dataset.file.clone(),
+                    sensor: dataset.sensor,
                     poses: options.first_poses,
                     left_mm,
                     held_out_mm: unexplained_mm,

@@ -92,23 +92,24 @@ impl Tracker {
     fn squares_of_model_in_use(&self, records: &[PoseRecord]) -> Option<Vec<f64>> {
         let problem = self.problem(records);
         let (arm, p) = (self.initial.order.len(), self.parameters.len());
+        let frames = self.first_of_frames();
         let rows = problem.rows();
         let mut x = vec![0.0; p];
         x[arm..].copy_from_slice(&self.filter.x.as_slice()[arm..]);
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
         for _ in 0..STEPS {
             problem.jacobian(&x, 0..rows, &mut r, &mut j);
-            let slopes = DMatrix::from_column_slice(rows, p - arm, &j[arm * rows..]);
+            let slopes = DMatrix::from_column_slice(rows, p - frames, &j[frames * rows..]);
             let mut normal = slopes.tr_mul(&slopes);
             // What no reading tells of the frames stays where it is.
             let damping = DAMPING * normal.diagonal();
-            (0..p - arm).for_each(|k| normal[(k, k)] += damping[k].max(f64::MIN_POSITIVE));
+            (0..p - frames).for_each(|k| normal[(k, k)] += damping[k].max(f64::MIN_POSITIVE));
             let step = normal.cholesky()?.solve(&slopes.tr_mul(&DVector::from_column_slice(&r)));
-            x[arm..].iter_mut().zip(step.iter()).for_each(|(x, step)| *x -= step);
+            x[frames..].iter_mut().zip(step.iter()).for_each(|(x, step)| *x -= step);
         }
         problem.residuals(&x, 0..rows, &mut r);
         let per = problem.rows_per_observation();
-        let freedom = rows as f64 / (rows.checked_sub(p - arm).filter(|left| *left > 0)?) as f64;
+        let freedom = rows as f64 / (rows.checked_sub(p - frames).filter(|left| *left > 0)?) as f64;
         let square = |(rows, record): (&[f64], &PoseRecord)| {
             freedom * rows.iter().take(3).map(|r| r * r).sum::<f64>() / record.per_mm.powi(2)
         };

@@ -134,7 +134,8 @@ impl Tracker {
         let problem = other.problem(&poses);
         other.state.outliers = 0;
         for (at, record) in poses.iter_mut().enumerate() {
-            let taken = other.update(&problem, at);
+            let registered = other.registered(at);
+            let taken = other.update_about(&problem, at, registered.as_ref());
             record.nis = taken.nis;
             record.error_mm = other.error_mm(&problem, at, record.per_mm);
             other.state.outliers += usize::from(taken.set_aside);

@@ -7,6 +7,7 @@ use super::bounds::{outlier_bound, window_bound};
 use super::last_link::ZERO_LOST_RAD;
 use super::locate::{Change, Explanation, Form, Group, GroupChange, locate};
 use super::mounting::Beside;
+use super::scale::SCALE;
 use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
@@ -152,7 +153,7 @@ impl Tracker {
         let (history, last) = (&self.state.history, self.state.history.last()?);
         let since = found.together.as_ref().map_or(found.best.since, |t| t.since);
         let onset = &history[since];
-        let name = |k: usize| self.parameters[k].to_string();
+        let name = |k: usize| self.name(k);
         let best = &found.best;
         let mut alarm = Alarm {
             noticed_file: last.file.clone(),
@@ -233,8 +234,11 @@ impl Tracker {
         None
     }
 
-    /// What a parameter of an effect is, in words.
+    /// What a parameter of an effect is, or the scale, in words.
     fn label(&self, k: usize) -> Option<String> {
+        if self.parameters[k] == SCALE {
+            return Some("the scale of the sensor".to_owned());
+        }
         let Parameter::Effect { index, parameter } = self.parameters[k] else { return None };
         let effect = self.initial.model.effects.get(index)?;
         let of = effect.joint().map_or(String::new(), |joint| format!(" of joint {}", joint + 1));
@@ -349,6 +353,7 @@ impl Tracker {
         self.filter = filter;
         let poses = std::mem::take(&mut self.state.history);
         let problem = self.problem(&poses);
+        let forgotten = self.state.poses - poses.len();
         let single = found.together.is_none();
         let bound = outlier_bound(self.state.sensor.scalars());
         // What moves the readings exactly as the sensor does is the sensor: see `compare_changes`.
@@ -388,7 +393,8 @@ impl Tracker {
             if poses[at].begins_station {
                 self.release_sensor();
             }
-            let taken = !self.update(&problem, at).set_aside;
+            let registered = self.registered(forgotten + at);
+            let taken = !self.update_about(&problem, at, registered.as_ref()).set_aside;
             if taken && !(poses[at].nis <= bound) {
                 self.state.outliers = self.state.outliers.saturating_sub(1);
                 extend_region(&mut self.state.region, &poses[at].joints);

@@ -10,6 +10,7 @@ use super::error::TrackError;
 use super::first_noise::FirstPoses;
 use super::gauge::Gauge;
 use super::options::Options;
+use super::scale::{AS_CALIBRATED, SCALE, SCALE_NAME, scale};
 use super::state::{ConsumedFile, PoseRecord, SCHEMA, Snapshot, State, digest, extend_region};
 use super::station::{end_of_station, moved, number_of, station_of};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
@@ -70,8 +71,18 @@ fn first_covariance(model: &Estimated, parameters: &[Parameter]) -> DMatrix<f64>
 /// The sensor was registered with a few poses under this model, so its frame is off by no more than links of ordinary tolerance can shift it.
 /// The poses used for registration are filtered like all others.
 pub(super) fn frame_priors(model: &Estimated, parameters: &[Parameter]) -> Vec<Prior> {
-    Tolerance { target_mm: 10.0, target_rad: 0.02, frame_mm: 20.0, frame_rad: 0.04, ..Tolerance::default() }
-        .priors(parameters, &model.model)
+    let tolerance = Tolerance {
+        target_mm: 10.0,
+        target_rad: 0.02,
+        frame_mm: 20.0,
+        frame_rad: 0.04,
+        ..Tolerance::default()
+    };
+    let prior = |parameter: &Parameter| match *parameter {
+        SCALE => Prior { mean: 0.0, sigma: AS_CALIBRATED },
+        _ => tolerance.prior(parameter, &model.model),
+    };
+    parameters.iter().map(prior).collect()
 }
 
 /// Recursive estimator of one arm's parameters.
@@ -133,7 +144,7 @@ impl Tracker {
         let (observed, _) = prepare_observations(&first, &model.nominal, false);
         let FirstPoses { frames, sigma_mm, sigma_rad } = FirstPoses::of(model, &observed, options)?;
         let sensing = frame_parameters(&observed.dataset);
-        let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
+        let parameters: Vec<Parameter> = model.order.iter().copied().chain([SCALE]).chain(sensing).collect();
         let covariance = first_covariance(model, &parameters);
         let filter =
             RecursiveLeastSquares::new(DVector::zeros(parameters.len()), covariance, Memory::SquareRoot)
@@ -194,7 +205,12 @@ impl Tracker {
         let mut shape = Row::new(0, Joints::zeros(), Reading::Cable(0.0));
         shape.anchor = state.outlets_mm.len().saturating_sub(1);
         let sensing = frame_parameters(&Dataset::new(file, state.sensor, vec![shape]));
-        let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
+        // A track of an earlier version has no scale.
+        let has_scale = state.now.x.len() > model.order.len() + sensing.len();
+        let own_scale = has_scale.then_some(SCALE);
+        frames.disturbances.extend(own_scale.map(|_| scale()));
+        let parameters: Vec<Parameter> =
+            model.order.iter().copied().chain(own_scale).chain(sensing).collect();
         let snapshots = [Some(&state.now), Some(&state.reference), Some(&state.middle), state.start.as_ref()];
         if snapshots.iter().flatten().any(|s| s.x.len() != parameters.len()) {
             return Err(wrong(
@@ -308,7 +324,8 @@ impl Tracker {
     ) -> Option<Alarm> {
         record.predicted_mm =
             Some(self.error_mm(problem, at, record.per_mm).abs()).filter(|mm| mm.is_finite());
-        let taken = self.update(problem, at);
+        let registered = self.registered(self.state.poses);
+        let taken = self.update_about(problem, at, registered.as_ref());
         record.nis = taken.nis;
         self.state.poses += 1;
         self.state.outliers += usize::from(taken.set_aside);
@@ -350,11 +367,21 @@ impl Tracker {
     /// Filters observation `pose` of `problem`: process noise, linearisation, one update per row. This is the whole cost of a
     /// pose apart from an alarm.
     pub fn update(&mut self, problem: &CalibrationProblem, pose: usize) -> PoseUpdate {
+        self.update_about(problem, pose, None)
+    }
+
+    /// The same, linearised at a state that is known better than the filter's own as yet.
+    pub(super) fn update_about(
+        &mut self,
+        problem: &CalibrationProblem,
+        pose: usize,
+        known: Option<&DVector<f64>>,
+    ) -> PoseUpdate {
         let (p, per) = (self.parameters.len(), problem.rows_per_observation());
         self.filter.predict(&self.drift);
         let mut trial = self.filter.clone();
         let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
-        let at = trial.x.clone();
+        let at = known.unwrap_or(&trial.x).clone();
         problem.jacobian(at.as_slice(), pose * per..(pose + 1) * per, &mut r, &mut j);
         let mut a = DVector::zeros(p);
         let mut nis = 0.0;
@@ -372,6 +399,13 @@ impl Tracker {
             self.filter = trial;
         }
         PoseUpdate { nis, set_aside }
+    }
+
+    /// Where pose `number` of the track is linearised, if it is one of those that registered the sensor: where they put it together. Each by
+    /// itself leaves outlet, zero and target open by centimetres; a filter that follows them there is linearised elsewhere at every
+    /// pose, and counts as known what no reading tells.
+    pub(super) fn registered(&self, number: usize) -> Option<DVector<f64>> {
+        (number < self.state.options.first_poses).then(|| DVector::zeros(self.parameters.len()))
     }
 
     pub(super) fn problem(&self, poses: &[PoseRecord]) -> CalibrationProblem {
@@ -461,6 +495,20 @@ impl Tracker {
         &self.parameters
     }
 
+    /// Name of a tracked parameter.
+    pub fn name(&self, k: usize) -> String {
+        match self.parameters[k] {
+            SCALE => SCALE_NAME.to_owned(),
+            parameter => parameter.to_string(),
+        }
+    }
+
+    /// The first parameter that places sensor or target: before it are those of the arm, and the scale.
+    pub(super) fn first_of_frames(&self) -> usize {
+        let places = |parameter: &Parameter| !parameter.is_of_arm() && *parameter != SCALE;
+        self.parameters.iter().position(places).unwrap_or(self.parameters.len())
+    }
+
     /// Deviations of the parameters from the model that tracking began with.
     pub fn deviations(&self) -> &[f64] {
         self.filter.x.as_slice()
@@ -489,6 +537,7 @@ fn process_noise(parameter: &Parameter, options: &Options) -> f64 {
         return *own;
     }
     match (parameter.is_of_arm(), parameter.unit()) {
+        (false, "") => 0.0,
         (true, "mm") => options.drift_length_mm,
         (true, "rad") => options.drift_angle_rad,
         // Parameters of effects have various units: constant unless a drift is stated for them.

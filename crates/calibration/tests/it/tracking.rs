@@ -1,5 +1,6 @@
 //! A simulated arm that is watched: what moves is named, and a stop changes nothing.
 
+mod cable;
 mod hidden_changes;
 mod set_ups;
 

@@ -5,12 +5,13 @@
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, StageErrors};
 use truegrind_calibration::diagnosis;
 use truegrind_calibration::identification::benefit::{NoBenefit, benefit};
-use truegrind_calibration::identification::identify::prepare_observations;
+use truegrind_calibration::identification::identify::{self, prepare_observations};
 use truegrind_calibration::identification::inflation::{inflation_from_errors, inflation_from_rows};
 use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::identification::verdict::{Limits, VerdictBuilder};
-use truegrind_calibration::measurement::import;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading};
+use truegrind_calibration::measurement::{import, split};
 use truegrind_math::statistics::ErrorSummary;
 
 use super::promise::{Case, Outcome};
@@ -213,4 +214,60 @@ fn a_doubtful_model_says_so_in_its_file() {
     assert!(text.contains("status = \"doubtful\""), "{:?}", found.estimated.verdict);
     let (read, written) = (Estimated::from_toml(&text).unwrap().verdict, &found.estimated.verdict);
     assert_eq!((read.status, read.sentences()), (written.status, written.sentences()));
+}
+
+/// The class: what only the sensor's scale can tell was asked of more poses, and two ways to the same arm counted its uncertainty once and twice.
+#[test]
+fn a_scale_that_is_known_too_little_is_said_to_be_so_by_identification_and_diagnosis() {
+    let case = Case { cable: true, ..tracker(120, 0.05, 0.003) };
+    let simulation = case.measured();
+    let dataset = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
+    let tolerance = Tolerance { scale: Some(4e-3), learn_widths: true, ..Tolerance::default() };
+    let nominal = &simulation.nominal;
+    let frames = candidate_frames(&dataset, nominal).unwrap().remove(0);
+    let alone = identify::Options { tolerance, ..identify::Options::default() };
+    let division = |d: &Dataset| split::random(d, 0.2, 0);
+    let identified =
+        identify::identify(&dataset, "abb-irb-120", nominal, &frames, &division, &alone).unwrap();
+    let mut options = diagnosis::diagnose::Options { arm_tolerance: tolerance, ..Default::default() };
+    options.selection.most = 0;
+    let diagnosed =
+        diagnosis::diagnose::diagnose(&dataset, "abb-irb-120", nominal, &frames, &options, &|_| ()).unwrap();
+    for verdict in [&identified.estimated.verdict, &diagnosed.estimated.verdict] {
+        assert_eq!(verdict.status, Judgement::Doubtful);
+        let said = verdict.sentences().join("\n");
+        assert!(said.contains("the scale of the sensor is known too little"), "{said}");
+        assert!(!said.contains("measure more poses"), "{said}");
+    }
+    let [of_fit, of_diagnosis] = [identified.benefit, diagnosed.benefit].map(Option::unwrap);
+    assert!((of_fit.determined - of_diagnosis.determined).abs() < 1.0, "{of_fit:?} {of_diagnosis:?}");
+    assert!(of_fit.probability_without_scale > 0.96 && of_fit.probability < 0.96, "{of_fit:?}");
+}
+
+/// A cable's readings that are no millimetres, or fall as it leaves, are named as inches are.
+#[test]
+fn counts_of_an_encoder_and_falling_readings_are_named() {
+    let case = Case { cable: true, ..tracker(120, 0.05, 0.0) };
+    let simulation = case.measured();
+    let dataset = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
+    let refused = |change: &dyn Fn(f64) -> f64| {
+        let mut rows = dataset.clone();
+        for row in rows.rows.iter_mut() {
+            let Reading::Cable(length) = &mut row.reading else { panic!("a cable") };
+            *length = change(*length);
+        }
+        let frames = candidate_frames(&rows, &simulation.nominal).unwrap().remove(0);
+        let division = |d: &Dataset| split::random(d, 0.2, 0);
+        let options = identify::Options::default();
+        let found =
+            identify::identify(&rows, "abb-irb-120", &simulation.nominal, &frames, &division, &options);
+        found.map(|_| ()).unwrap_err().to_string()
+    };
+    let falling = refused(&|length| 2000.0 - length);
+    assert!(falling.contains("fall as the cable leaves") && !falling.contains("units are"), "{falling}");
+    let counts = refused(&|length| 20.0 * length);
+    assert!(counts.contains("that 20.0") || counts.contains("that 19.9"), "{counts}");
+    assert!(counts.contains("counts per millimetre") && !counts.contains("fall as"), "{counts}");
+    let both = refused(&|length| 40_000.0 - 20.0 * length);
+    assert!(both.contains("fall as the cable leaves") && both.contains("counts per millimetre"), "{both}");
 }
