@@ -27,7 +27,7 @@ use super::mark;
 use super::modal_state::OrientationMode;
 use super::orientation::{Angles, vector_and_spin};
 use super::task::{BlockContext, StateEvent, Task};
-use crate::edit::{EditError, Edits};
+use crate::edit::{EditError, Edits, line_end};
 use crate::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
 use crate::rewrite::{Change, Extra, FileEdits, NewTarget, RewriteOptions, RewriteOutcome, Rewritten};
 
@@ -630,13 +630,4 @@ fn goal_of(motion: &Motion, change: &Change) -> Option<Goal> {
     let mut goal = goal?;
     goal.via = via;
     Some(goal)
-}
-
-/// The line end that a file uses.
-pub(super) fn line_end(source: &[u8]) -> &'static [u8] {
-    match source.iter().position(|&byte| byte == b'\n') {
-        None if source.contains(&b'\r') => b"\r",
-        Some(at) if at > 0 && source[at - 1] == b'\r' => b"\r\n",
-        _ => b"\n",
-    }
 }
