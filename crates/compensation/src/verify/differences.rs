@@ -38,6 +38,8 @@ const MAX_TURN_STEPS: f64 = 4000.0;
 /// Targets are the same within this (mm, rad): numbers are written with fewer decimals.
 const SAME_MM: f64 = 1e-3;
 const SAME_RAD: f64 = 1e-5;
+/// An axis that a block states as the original does is off by no more than this (mm).
+const KEPT_MM: f64 = 1e-9;
 /// Motions of a program among which the cut of an air move is sought.
 const NEAR_MOTIONS: usize = 50;
 
@@ -240,8 +242,18 @@ impl Compared<'_> {
             self.deviation_beside(index).unwrap_or_else(|| (deviation(before, before), 0.0));
         let bound_mm = FREE_MM + FREE_LEVER * apart_mm;
         let place = (before.base_from_object * before.commanded).translation.vector;
-        let is_carried = self.placements.iter().any(|kept| (off - kept.at(&place)).norm() <= bound_mm);
-        if off.norm() > FREE_MM && (off - beside).norm() > bound_mm && !is_carried {
+        let is_possible = |off: &Vector3<f64>| {
+            off.norm() <= FREE_MM
+                || (off - beside).norm() <= bound_mm
+                || self.placements.iter().any(|kept| (off - kept.at(&place)).norm() <= bound_mm)
+        };
+        // A lift of an NC program before a canned cycle is corrected only in the axes that it omits: in the others it is off as in the original.
+        let in_moved_axes = || {
+            let is_moved = correction(before, after).map(|by| f64::from(u8::from(by.abs() > KEPT_MM)));
+            let object = before.base_from_object.rotation;
+            object * (object.inverse() * off).component_mul(&is_moved)
+        };
+        if !is_possible(&off) && !(self.original.numbered && is_possible(&in_moved_axes())) {
             let mm = off.norm();
             return Some(format!("{} ends {mm:.1} mm from where the original intends", is.instruction));
         }

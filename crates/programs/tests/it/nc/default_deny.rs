@@ -373,7 +373,7 @@ fn unmodified_motions_keep_their_end_points() {
     });
     assert_eq!(
         rewritten.outcomes[..2],
-        [RewriteOutcome::Refused(BeforeUnmodifiedArc), RewriteOutcome::Refused(WrongShape)]
+        [RewriteOutcome::Refused(BeforeUnmodifiedArc), RewriteOutcome::Refused(OpenCircle)]
     );
     assert_eq!(text, source.replace("G1 X5\n", "G1 X5.5000\n"));
     // Without TRAORI a tool vector is not a word.
