@@ -183,7 +183,7 @@ pub(crate) fn may_cut(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
         // A path that is given in the text but consists of neither lines nor arcs, or an unknown
         // instruction.
-        || matches!(motion.own_reason, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode))
+        || matches!(motion.own_reason, Some(Reason::UnsupportedPath | Reason::RoundedCorner | Reason::UnknownInstruction | Reason::NoMotionCode))
         // After a jump, a call or a label a block without its own G0 or G1 may be either.
         || motion.kind == MotionKind::Unknown && motion.own_reason == Some(Reason::UnknownFlow);
     // A search motion ends, and stops, at its signal.

@@ -32,7 +32,7 @@ macro_rules! reasons {
 reasons! {
     /// Why a value is unknown, or a motion is not corrected.
     Reason {
-        Parameter => "a parameter of the routine: its value comes from the caller",
+        Parameter => "a parameter of the routine: its value comes from the caller, and one text cannot hold a correction for each; write a routine for each target",
         Undeclared => "declared in none of the given files",
         Ambiguous => "declared globally in several modules",
         Uninitialised => "declared without a value: only the controller has it",
@@ -40,9 +40,9 @@ reasons! {
         Escaped => "passed to a routine outside the given files, which may change it",
         RunTimeFunction => "result of a function known only at run time",
         CurrentPosition => "relative to the current position of the robot (CRobT): it follows the corrected path without a change",
-        RunTimeOffset => "offset by a value known only at run time",
+        RunTimeOffset => "offset by a value known only at run time, and one text cannot hold a correction for each pass: write the passes one after another, with numbers",
         Persistent => "needs persistent data (PERS), of which the controller may hold another value than the file; declare data that never change as CONST",
-        RunTimeIndex => "array element chosen at run time",
+        RunTimeIndex => "array element chosen at run time: write a motion for each element",
         IndexOutOfRange => "array index outside the declared array",
         WrongShape => "the value does not have the form that the instruction requires",
         BadQuaternion => "the quaternion is not normalised (the squares of its numbers add up to less than 0.9 or more than 1.1)",
@@ -82,7 +82,7 @@ reasons! {
         PositionUnknown => "the position of an axis is unknown: not programmed since the start, a reference return, or a change of frame or tool",
         OrientationUnknown => "the tool orientation is unknown: no A, B, C or tool vector with known values since the start, a call or a change of frame; state all three again",
         UnknownConvention => "the convention of A, B and C is unknown: the robot file does not name one",
-        UnknownVariable => "a variable known only at run time",
+        UnknownVariable => "a variable known only at run time: write its number, and the passes of a loop one after another",
         AmbiguousNumber => "a number without decimal point: mm or increments, depending on a parameter of the control",
         NoMotionCode => "no motion code (G0, G1, ...) before this block, or none since G80: the mode depends on the control",
         UnknownFlow => "reached by a jump, call or loop: the modal state here is known only at run time, until its words are stated again",

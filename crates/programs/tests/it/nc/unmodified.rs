@@ -35,10 +35,30 @@ fn the_start_of_an_unmodified_path_is_pinned() {
         &[
             ("L X+10\nL X+20\nCC X+20 Y+10\nCP IPA+90 DR+", &[None, path, other]),
             ("L X+10\nL X+20\nL X+30\nCT X+50 Y+20", &[None, path, path, other]),
-            ("L X+10\nL X+20\nRND R2", &[None, None, other]),
+            ("L X+10\nL X+20\nRND R2", &[path, left(RoundedCorner), left(RoundedCorner)]),
         ],
     );
     check(LinuxCnc, &[("X10\nX20\nG5.1 X30 Y5 I2 J3", &[None, path, other])]);
+}
+
+/// A control rounds or chamfers a corner in its working plane alone, which corrected lines leave: both its lines stay, and where the first begins.
+/// On a Heidenhain they were corrected, and under RNDM all but the line with that word.
+#[test]
+fn rounded_corners_keep_their_lines() {
+    let (path, corner) = (left(BeforeUnmodifiedPath), left(RoundedCorner));
+    check(
+        Siemens,
+        &[
+            ("X10\nX20 RND=2\nY30\nX40", &[path, corner, corner, None]),
+            ("X10\nX20 CHF=2\nM8\nY30\nX40", &[path, corner, corner, None]),
+            ("RNDM=2\nX10\nX20\nRNDM=0\nX30\nX40", &[corner, corner, corner, None]),
+        ],
+    );
+    check(Fanuc, &[("X10.\nX20. ,R2.\nY30. ,C1.\nX40.\nX50.", &[path, corner, corner, corner, None])]);
+    check(
+        Heidenhain,
+        &[("L X+10\nL X+20\nRND R2\nL Y+30\nL X+40", &[path, corner, corner, corner, None])],
+    );
 }
 
 /// After a rotation of the frame, a path that needs one axis depends on every axis of the motions before.
@@ -147,7 +167,7 @@ fn a_displaced_g92_shift_moves_no_unmodified_motion() {
 #[test]
 fn an_omitted_tool_vector_is_restated() {
     let source = format!(
-        "{HEAD}G90 G71 G17 G54\nTRAORI\nG1 X10 Y0 Z50 A3=0 B3=0 C3=1 THETA=0 F600\nG1 X9 Y1 RND=2\nX10 Y0 Z50\n/X5\nX6 A3=0 B3=0 C3=1\n"
+        "{HEAD}G90 G71 G17 G54\nTRAORI\nG1 X10 Y0 Z50 A3=0 B3=0 C3=1 THETA=0 F600\n/G1 X9 Y1\nX10 Y0 Z50\n/X5\nX6 A3=0 B3=0 C3=1\n"
     );
     let (text, _) = rewrite_as(&source, Siemens, |listing| {
         let mut changes = moved(listing, [0.0; 3]);
@@ -165,7 +185,7 @@ fn an_omitted_tool_vector_is_restated() {
     let lines: Vec<&str> = text.lines().collect();
     let line = |begin: &str| *lines.iter().find(|line| line.starts_with(begin)).unwrap();
     let again = "A3=0.0000000 B3=0.0000000 C3=1.0000000 THETA=0.000000";
-    assert_eq!(line("G1 X9"), format!("G1 X9 Y1 {again} RND=2"));
+    assert_eq!(line("/G1 X9"), format!("/G1 X9 Y1 {again}"));
     assert_eq!(line("/X5"), format!("/X5 {again}"));
     // After a block that may be skipped both are stated.
     assert!(line("X6").contains("THETA="), "{text}");
