@@ -9,6 +9,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::executed_end::{ExecutedEnd, deviation};
 use super::kept_placement::KeptPlacement;
+use crate::cut::only_start;
 use crate::line_list::lines_of;
 use crate::segment::curve::Curve;
 use truegrind_arm::model::Joints;
@@ -413,7 +414,7 @@ impl Compared<'_> {
         let off_deg = |end: Option<&ExecutedEnd>, of: usize| {
             Some(turn_deg(&self.after[self.partners[of]?]?.reached, &end?.commanded))
         };
-        let start = self.original.motions[index].previous.map(|start| start as usize);
+        let start = only_start(self.original, index);
         let ends = [start, Some(index)].into_iter().flatten();
         let beside_deg = ends.filter_map(|of| off_deg(self.before[of], of)).fold(0.0, f64::max);
         (deg > FREE_DEG + (1.0 + FREE_SHARE) * beside_deg).then_some(deg)
@@ -422,7 +423,7 @@ impl Compared<'_> {
     /// The way of an original motion, and how far what a correction writes for it may be off (mm).
     fn way_of(&self, index: usize) -> Option<(Curve, f64)> {
         let was = &self.original.motions[index];
-        let start_index = was.previous.map(|previous| previous as usize).or(index.checked_sub(1))?;
+        let start_index = only_start(self.original, index).or(index.checked_sub(1))?;
         let (start, end) = (self.before[start_index]?, self.before[index]?);
         // The start may be stated in another work object.
         let from = end.base_from_object.inverse() * start.base_from_object * start.commanded;

@@ -55,10 +55,7 @@ fn rounded_corners_keep_their_lines() {
         ],
     );
     check(Fanuc, &[("X10.\nX20. ,R2.\nY30. ,C1.\nX40.\nX50.", &[path, corner, corner, corner, None])]);
-    check(
-        Heidenhain,
-        &[("L X+10\nL X+20\nRND R2\nL Y+30\nL X+40", &[path, corner, corner, corner, None])],
-    );
+    check(Heidenhain, &[("L X+10\nL X+20\nRND R2\nL Y+30\nL X+40", &[path, corner, corner, corner, None])]);
 }
 
 /// After a rotation of the frame, a path that needs one axis depends on every axis of the motions before.
