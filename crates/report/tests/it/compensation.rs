@@ -366,7 +366,10 @@ fn a_work_object_without_a_corrected_motion_is_not_called_corrected() {
         remedy: None,
     }];
     let said = |plan: &Plan| sentences(plan, &listing).join("\n");
-    assert!(said(&plan).contains("wobj0: shape and placement are corrected; the path as a whole"));
+    assert!(
+        said(&plan)
+            .contains("wobj0: shape and placement are corrected in 3 of 7 motions; the path as a whole")
+    );
     plan.outcomes.iter_mut().for_each(|outcome| outcome.status = MotionStatus::Left);
     let text = said(&plan);
     assert!(
