@@ -254,7 +254,7 @@ impl Compared<'_> {
             let object = before.base_from_object.rotation;
             object * (object.inverse() * off).component_mul(&is_moved)
         };
-        if !is_possible(&off) && !(self.original.numbered && is_possible(&in_moved_axes())) {
+        if !(is_possible(&off) || self.original.numbered && is_possible(&in_moved_axes())) {
             let mm = off.norm();
             return Some(format!("{} ends {mm:.1} mm from where the original intends", is.instruction));
         }
