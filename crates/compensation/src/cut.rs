@@ -139,6 +139,15 @@ pub(crate) fn starts(listing: &Listing, index: u32) -> Vec<u32> {
     }
 }
 
+/// The motion that ends where another begins, in whichever routine; `None` unless it is one.
+pub(crate) fn only_start(listing: &Listing, index: usize) -> Option<usize> {
+    let only = || match listing.predecessors.get(&(index as u32))?.as_slice() {
+        [start] => Some(*start),
+        _ => None,
+    };
+    Some(listing.motions[index].previous.or_else(only)? as usize)
+}
+
 /// Where the motions of a program may begin: as [`starts`], across calls and jumps, and where nothing of it is known at the end of the
 /// motion before it in the text of its routine.
 pub(crate) struct StartsOf<'a> {
@@ -183,7 +192,7 @@ pub(crate) fn may_cut(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
         // A path that is given in the text but consists of neither lines nor arcs, or an unknown
         // instruction.
-        || matches!(motion.own_reason, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode))
+        || matches!(motion.own_reason, Some(Reason::UnsupportedPath | Reason::RoundedCorner | Reason::UnknownInstruction | Reason::NoMotionCode))
         // After a jump, a call or a label a block without its own G0 or G1 may be either.
         || motion.kind == MotionKind::Unknown && motion.own_reason == Some(Reason::UnknownFlow);
     // A search motion ends, and stops, at its signal.

@@ -34,6 +34,15 @@ pub enum EditError {
     TooLong,
 }
 
+/// The line end that a file uses: a line feed, with or without a carriage return, or that alone.
+pub(crate) fn line_end(source: &[u8]) -> &'static [u8] {
+    match source.iter().position(|&byte| byte == b'\n') {
+        None if source.contains(&b'\r') => b"\r",
+        Some(at) if at > 0 && source[at - 1] == b'\r' => b"\r\n",
+        _ => b"\n",
+    }
+}
+
 /// 32-bit offsets, because there may be millions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Entry {
@@ -175,10 +184,14 @@ impl Edits {
     /// assert_eq!(edits.grown_lines(source, 12), [6..15]);
     /// assert_eq!(edits.grown_lines(source, 14), []);
     /// assert_eq!(edits.grown_lines(source, 5), [0..6, 6..15]);
+    /// let with_carriage_returns = source.map(|byte| if byte == b'\n' { b'\r' } else { byte });
+    /// assert_eq!(edits.grown_lines(&with_carriage_returns, 22), []);
     /// ```
     pub fn grown_lines(&self, source: &[u8], most: usize) -> Vec<Range<usize>> {
         let mut out = Vec::new();
         let mut line = 0..0;
+        let last = line_end(source).last().copied();
+        let ends_line = |byte: &u8| Some(*byte) == last;
         // The bytes that new text adds to the line after its last line end, less the replaced ones.
         let mut more = 0isize;
         let mut close = |line: &Range<usize>, more: isize| {
@@ -190,13 +203,12 @@ impl Edits {
         for (range, text) in self.iter() {
             if range.start >= line.end {
                 close(&line, more);
-                let begin =
-                    source[..range.start].iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-                let end = source[range.start..].iter().position(|byte| *byte == b'\n');
+                let begin = source[..range.start].iter().rposition(ends_line).map_or(0, |at| at + 1);
+                let end = source[range.start..].iter().position(ends_line);
                 (line, more) = (begin..end.map_or(source.len(), |at| range.start + at + 1), 0);
             }
             // Inserted blocks are lines of their own.
-            let own = text.iter().rposition(|byte| *byte == b'\n').map_or(text, |at| &text[at + 1..]);
+            let own = text.iter().rposition(ends_line).map_or(text, |at| &text[at + 1..]);
             more += own.len() as isize - range.len() as isize;
         }
         close(&line, more);

@@ -147,7 +147,10 @@ fn circles(
             None => stated(before, to.frames_index, frame_table),
         };
         if changes_arc(start, via, to, motion) {
-            infeasible_arcs.insert(index, OutcomeReason::NoCircle);
+            let line = before.place.line;
+            let reason =
+                start.map_or(OutcomeReason::NoCircle, |_| OutcomeReason::ArcFromUncorrected { line });
+            infeasible_arcs.insert(index, reason);
         }
     }
     infeasible_arcs

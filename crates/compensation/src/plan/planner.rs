@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use crate::arms::Arms;
 use crate::configuration::monitored;
-use crate::cut::StartsOf;
+use crate::cut::{StartsOf, only_start};
 use crate::deviation::{MotionStatus, PathPoint};
 use crate::feasibility::unchanged::blocking_reason;
 use crate::frames::frame_pair::FramePair;
@@ -228,16 +228,29 @@ impl<'a> Planner<'a> {
         out
     }
 
+    fn start(&self, index: usize) -> Option<usize> {
+        only_start(self.listing, index)
+    }
+
+    /// The motion that begins where another ends, in whichever routine; `None` unless it is one.
+    fn end(&self, index: usize) -> Option<usize> {
+        let behind = self.listing.motions.get(index + 1);
+        if behind.is_some_and(|behind| behind.previous == Some(index as u32)) {
+            return Some(index + 1);
+        }
+        let across_calls = &self.listing.across_calls;
+        let first = across_calls.partition_point(|[start, _]| (*start as usize) < index);
+        let mut ends = across_calls[first..].iter().take_while(|[start, _]| *start as usize == index);
+        let [_, end] = ends.next().filter(|_| ends.next().is_none())?;
+        Some(*end as usize)
+    }
+
     /// How the path is rounded where a line begins and where it ends.
     fn rounded_ends(&self, index: usize) -> [RoundedEnd; 2] {
-        let start = self.listing.motions[index].previous.map(|start| start as usize);
-        let behind = self.listing.motions.get(index + 1);
-        let is_next = behind.is_some_and(|behind| behind.previous == Some(index as u32));
-        let end = is_next.then_some(index + 1);
-        let before = start.and_then(|start| self.listing.motions[start].previous);
+        let start = self.start(index);
         [
-            self.rounded_end(before.map(|before| before as usize), start, Some(index)),
-            self.rounded_end(start, Some(index), end),
+            self.rounded_end(start.and_then(|start| self.start(start)), start, Some(index)),
+            self.rounded_end(start, Some(index), self.end(index)),
         ]
     }
 
@@ -273,7 +286,7 @@ impl<'a> Planner<'a> {
         if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular | MotionKind::Joint) {
             return None;
         }
-        self.path_from(motion.previous? as usize, index)
+        self.path_from(self.start(index)?, index)
     }
 
     /// The same from the end of a motion that may come before it.
@@ -378,14 +391,15 @@ impl<'a> Planner<'a> {
     /// previously planned motion.
     fn corner(
         &self,
-        motion: &Motion,
+        index: usize,
         path: Option<&Segment<'a>>,
         segment_plan: &SegmentPlan,
         last: Option<&(u32, SegmentPlan)>,
     ) -> Option<f64> {
+        let motion = &self.listing.motions[index];
         let Segment { from: point, to, schedule } = path?;
         segment_plan.curves.as_ref()?;
-        let previous = motion.previous? as usize;
+        let previous = self.start(index)?;
         let before = &self.listing.motions[previous];
         let zone_mm = self.listing.zone(before)?.value.as_ref().ok().filter(|zone| !zone.fine)?.tcp_mm;
         // The manuals do not specify how a corner continues under another tool or work object.
@@ -394,7 +408,7 @@ impl<'a> Planner<'a> {
         }
         if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
             // Nearly all lines continue almost straight; three points show that.
-            let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;
+            let first = self.solved.of(self.start(previous)?).last()?.as_ref().ok()?;
             let [from, to] = [point, to].map(|end| end.intended.translation.vector);
             let points = [first.intended.position_mm(), from, to];
             if !(cut_of_lines(&points, zone_mm) > CUT_MM) {
@@ -406,7 +420,7 @@ impl<'a> Planner<'a> {
             corner(point, segment_in, segment_plan, zone_mm, condition_indices, self.arms, self.options.emit)
         };
         if let Some((index, segment_in)) = last
-            && Some(*index) == motion.previous
+            && *index as usize == previous
         {
             return deviation(segment_in);
         }
@@ -476,7 +490,7 @@ fn plan_motion<'a>(
     // All other flags hold only for the guessed configuration, so this one takes precedence.
     let guessed = motion.accepts_configuration && solved_targets().any(|s| s.guess != BranchGuess::Known);
     let mut flag = if guessed { Some(OutcomeReason::UnknownStart) } else { segment_plan.flag };
-    if let Some(corner) = job.corner(motion, path, &segment_plan, last) {
+    if let Some(corner) = job.corner(index, path, &segment_plan, last) {
         let deviation = outcome.path_deviation_mm.get();
         outcome.path_deviation_mm = deviation.map_or(corner, |deviation| deviation.max(corner)).into();
         if !(corner <= options.tolerance_mm) {

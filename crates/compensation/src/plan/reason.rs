@@ -121,6 +121,11 @@ pub enum OutcomeReason {
     /// The three points of a circular motion are collinear, two of them coincide, or the circle through them deviates from
     /// the intended path.
     NoCircle,
+    /// A circular motion that starts at an uncorrected place, from where its corrected points would make another circle.
+    ArcFromUncorrected {
+        /// Line of the motion that ends there, 1-based.
+        line: u32,
+    },
     /// The next circular motion remains unmodified and starts here; from a corrected start it would be a different circle.
     StartOfUnchangedArc {
         /// Line of that motion, 1-based.
@@ -267,6 +272,9 @@ impl OutcomeReason {
             }
             OutcomeReason::TooFast { .. } => "a joint exceeds its speed limit at the programmed speed",
             OutcomeReason::NoCircle => "its three points make no circle that follows the intended path",
+            OutcomeReason::ArcFromUncorrected { .. } => {
+                "it starts at a place that is not corrected: from there the corrected circle would be another one"
+            }
             OutcomeReason::StartOfUnchangedArc { .. } => {
                 "a circular motion that is not corrected starts here: from a corrected start it would be a different circle"
             }
@@ -356,6 +364,7 @@ impl OutcomeReason {
             OutcomeReason::PartOfCut { line, .. }
             | OutcomeReason::Step { line, .. }
             | OutcomeReason::HalfTurn { line }
+            | OutcomeReason::ArcFromUncorrected { line }
             | OutcomeReason::StartOfUnchangedArc { line }
             | OutcomeReason::StartOfUnchangedCut { line }
             | OutcomeReason::DepartureFromUnchangedCut { line }
@@ -494,6 +503,10 @@ impl fmt::Display for OutcomeReason {
                 f,
                 "on line {line} the tool turns by about 180°: after the correction the controller might turn it the other way round; insert a \
                  target halfway"
+            ),
+            OutcomeReason::ArcFromUncorrected { line } => write!(
+                f,
+                "it starts at the end of line {line}, which is not corrected: from there the corrected circle would be another one"
             ),
             OutcomeReason::StartOfUnchangedArc { line } => write!(
                 f,

@@ -24,6 +24,11 @@ use truegrind_programs::motion::{AxisTurn, Motion, Switch};
 /// circle whose ends are this close is written as one, and must be followed as one here.
 pub(crate) const CLOSED_MM: f64 = 2e-3;
 
+/// An arc about a stated axis whose ends are closer than this (mm), or than this share of their distance from the point opposite, is taken as
+/// a full turn whose ends are corrected differently: its centre is then known to about three thousandths of a millimetre all the same.
+const NEARLY_CLOSED_MM: f64 = 0.3;
+const NEARLY_CLOSED_SHARE: f64 = 0.01;
+
 /// An arc from its start over a point to its end, possibly rising along its axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arc {
@@ -52,6 +57,7 @@ impl Arc {
     ) -> Option<Self> {
         let (mut a, mut b) = (via - start, end - start);
         let mut rise = 0.0;
+        let is_stated = axis.is_some();
         let axis = match axis {
             Some(axis) => {
                 rise = axis.dot(&b);
@@ -62,8 +68,12 @@ impl Arc {
             None => Unit::try_new(a.cross(&b), 1e-9)?,
         };
         let whole = b.norm() < CLOSED_MM;
+        // Three points do not determine the circle where two of them are almost one. In an NC program the third is opposite.
+        let nearly_whole = is_stated && b.norm() < NEARLY_CLOSED_MM.max(NEARLY_CLOSED_SHARE * a.norm());
         let to_centre = if whole {
             0.5 * a
+        } else if nearly_whole && a.norm() > 4.0 * b.norm() {
+            0.5 * (a + 0.5 * b)
         } else {
             let normal = a.cross(&b);
             let square = normal.norm_squared();
@@ -78,8 +88,13 @@ impl Arc {
         }
         let x = -to_centre / radius;
         let y = axis.cross(&x);
-        let to_end = b - to_centre;
-        let sweep = if whole { TAU } else { to_end.dot(&y).atan2(to_end.dot(&x)).rem_euclid(TAU) };
+        let angle = |point: &Vector3<f64>| {
+            let off = point - to_centre;
+            off.dot(&y).atan2(off.dot(&x)).rem_euclid(TAU)
+        };
+        // About a stated axis a full turn whose ends are corrected differently may end a little behind its start.
+        let past_start = if angle(&a) > angle(&b) { TAU } else { 0.0 };
+        let sweep = if whole { TAU } else { angle(&b) + past_start };
         Some(Self { centre: start + to_centre, axis, x, y, radius, sweep, rise })
     }
 

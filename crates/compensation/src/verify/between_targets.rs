@@ -163,10 +163,20 @@ impl<'a> Followed<'a> {
         is_moved.then_some((end, partner))
     }
 
-    /// The motions from one target to another, the first and the last included. `in_text`: those between were inserted.
+    /// The motions from one target to another, the first and the last included. `in_text`: those between were inserted; otherwise they stand
+    /// before the last one in its routine.
     fn nodes(&self, first: usize, last: usize, in_text: bool) -> Option<Vec<&'a ExecutedEnd>> {
-        let motions =
-            if in_text { (first < last).then(|| (first..=last).collect())? } else { vec![first, last] };
+        let motions: Vec<usize> = if in_text {
+            (first < last).then(|| (first..=last).collect())?
+        } else {
+            let inserted = |motion: &usize| {
+                let before = self.rewritten.motions[*motion].previous? as usize;
+                (!self.partners.contains(&Some(before))).then_some(before)
+            };
+            let mut back: Vec<usize> = std::iter::successors(Some(last), inserted).chain([first]).collect();
+            back.reverse();
+            back
+        };
         let follows = |pair: &[usize]| {
             !in_text || self.rewritten.motions[pair[1]].previous.is_some_and(|p| p as usize == pair[0])
         };

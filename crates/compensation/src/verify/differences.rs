@@ -9,6 +9,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::executed_end::{ExecutedEnd, deviation};
 use super::kept_placement::KeptPlacement;
+use crate::cut::only_start;
 use crate::line_list::lines_of;
 use crate::segment::curve::Curve;
 use truegrind_arm::model::Joints;
@@ -38,6 +39,8 @@ const MAX_TURN_STEPS: f64 = 4000.0;
 /// Targets are the same within this (mm, rad): numbers are written with fewer decimals.
 const SAME_MM: f64 = 1e-3;
 const SAME_RAD: f64 = 1e-5;
+/// An axis that a block states as the original does is off by no more than this (mm).
+const KEPT_MM: f64 = 1e-9;
 /// Motions of a program among which the cut of an air move is sought.
 const NEAR_MOTIONS: usize = 50;
 
@@ -240,8 +243,18 @@ impl Compared<'_> {
             self.deviation_beside(index).unwrap_or_else(|| (deviation(before, before), 0.0));
         let bound_mm = FREE_MM + FREE_LEVER * apart_mm;
         let place = (before.base_from_object * before.commanded).translation.vector;
-        let is_carried = self.placements.iter().any(|kept| (off - kept.at(&place)).norm() <= bound_mm);
-        if off.norm() > FREE_MM && (off - beside).norm() > bound_mm && !is_carried {
+        let is_possible = |off: &Vector3<f64>| {
+            off.norm() <= FREE_MM
+                || (off - beside).norm() <= bound_mm
+                || self.placements.iter().any(|kept| (off - kept.at(&place)).norm() <= bound_mm)
+        };
+        // A lift of an NC program before a canned cycle is corrected only in the axes that it omits: in the others it is off as in the original.
+        let in_moved_axes = || {
+            let is_moved = correction(before, after).map(|by| f64::from(u8::from(by.abs() > KEPT_MM)));
+            let object = before.base_from_object.rotation;
+            object * (object.inverse() * off).component_mul(&is_moved)
+        };
+        if !(is_possible(&off) || self.original.numbered && is_possible(&in_moved_axes())) {
             let mm = off.norm();
             return Some(format!("{} ends {mm:.1} mm from where the original intends", is.instruction));
         }
@@ -401,7 +414,7 @@ impl Compared<'_> {
         let off_deg = |end: Option<&ExecutedEnd>, of: usize| {
             Some(turn_deg(&self.after[self.partners[of]?]?.reached, &end?.commanded))
         };
-        let start = self.original.motions[index].previous.map(|start| start as usize);
+        let start = only_start(self.original, index);
         let ends = [start, Some(index)].into_iter().flatten();
         let beside_deg = ends.filter_map(|of| off_deg(self.before[of], of)).fold(0.0, f64::max);
         (deg > FREE_DEG + (1.0 + FREE_SHARE) * beside_deg).then_some(deg)
@@ -410,7 +423,7 @@ impl Compared<'_> {
     /// The way of an original motion, and how far what a correction writes for it may be off (mm).
     fn way_of(&self, index: usize) -> Option<(Curve, f64)> {
         let was = &self.original.motions[index];
-        let start_index = was.previous.map(|previous| previous as usize).or(index.checked_sub(1))?;
+        let start_index = only_start(self.original, index).or(index.checked_sub(1))?;
         let (start, end) = (self.before[start_index]?, self.before[index]?);
         // The start may be stated in another work object.
         let from = end.base_from_object.inverse() * start.base_from_object * start.commanded;

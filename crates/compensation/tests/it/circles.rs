@@ -3,8 +3,11 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::model::Joints;
 use truegrind_compensation::cell::Cell;
+use truegrind_compensation::compensate::compensate;
 use truegrind_compensation::cut::Cuts;
 use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::options::{Circles, Options};
@@ -16,6 +19,7 @@ use truegrind_programs::motion::{MotionKind, Reason, Switch};
 use truegrind_programs::nc::dialect::Dialect;
 use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::rapid::Task;
+use truegrind_programs::reading::Program;
 use truegrind_programs::rewrite::RewriteOptions;
 
 use super::segment::{down, gone, known, module, module_with, rewrite, start_joints, told};
@@ -188,7 +192,8 @@ fn a_circle_whose_start_stays_is_no_other_circle() {
         // With all that begins where it ends.
         let small = of(seed, 0.5, &corrected);
         assert!(
-            small == [sensor, None, None] || small[..2] == [sensor, Some(OutcomeReason::NoCircle)],
+            small == [sensor, None, None]
+                || small[..2] == [sensor, Some(OutcomeReason::ArcFromUncorrected { line: 4 })],
             "{small:?}"
         );
         strayed += usize::from(small[1].is_some());
@@ -197,6 +202,41 @@ fn a_circle_whose_start_stays_is_no_other_circle() {
         assert_eq!(of(seed, 100.0, &unknown)[1..], [None; 2]);
     }
     assert!(strayed > 3, "{strayed}");
+}
+
+/// With backlash, or at another height, the ends of a full turn are corrected by different amounts. It was said to make no circle, or to be
+/// singular, and an arc behind it had its reason.
+#[test]
+fn a_full_turn_whose_ends_part_says_so_and_is_made_of_lines() {
+    let mut worn = perturbed(11, 1.0);
+    worn.effects.extend([0, 2].map(|joint| Effect::Backlash(Backlash { joint, play_rad: 4e-4 })));
+    let bent = perturbed(5, 3.0);
+    let head = "(truegrind angles wpr)\n(truegrind start [0, 10, 10, 0, 70, 0])\n(truegrind tool T1 t [[12,-8,110],[1,0,0,0]])\n\
+                (truegrind frame G54 w [[390,-10,230],[1,0,0,0]])\nG90 G21 G17 G40 G94\nT1 M6\nG54\nG43.4 H1\n\
+                G0 X-20. Y-20. Z30. A180. B0. C0.\nG0 X0. Y0.\nG1 Z2. F600.\n";
+    for (actual, turn) in
+        [(&worn, "G2 X0. Y0. I20. J0.\n"), (&worn, "G3 I20. J0.\n"), (&bent, "G2 X0. Y0. Z1. I20. J0.\n")]
+    {
+        let source = format!("{head}{turn}G2 X40. Y0. I20. J0.\nG1 X50.\nG0 Z30.\nM30\n");
+        let corrected = |circles: Circles| {
+            let setup = Setup { dialect: Some(Dialect::Fanuc), ..Setup::default() };
+            let program =
+                Program::Nc(truegrind_programs::nc::Task::read(&[("p.nc", source.as_bytes())], &setup));
+            let options = Options { circles, cuts: Cuts::Single, ..Options::default() };
+            compensate(&program, &known(actual), &Cell::default(), &options, None).unwrap().plan
+        };
+        let kept = corrected(Circles::Keep);
+        let [turn_reason, behind] = [3, 4].map(|motion| kept.outcomes[motion].reason());
+        assert_eq!(turn_reason, Some(OutcomeReason::Program(Reason::OpenCircle)), "{turn}");
+        let is_own = !matches!(
+            behind,
+            Some(OutcomeReason::Program(_) | OutcomeReason::NoCircle | OutcomeReason::SingularPath)
+        );
+        assert!(is_own, "{turn}{behind:?}");
+        let lines = corrected(Circles::Segments);
+        assert_eq!(lines.outcomes[3].reason(), None, "{turn}");
+        assert!(lines.outcomes[3].inserted > 10, "{turn}{:?}", lines.outcomes[3]);
+    }
 }
 
 /// An unmodified circular motion depends on its start as well: where that is corrected, a circle that is small against the

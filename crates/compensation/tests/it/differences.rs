@@ -8,6 +8,7 @@ use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::deviation::{After, PathReport};
 use truegrind_compensation::options::{Circles, Emit, Options};
+use truegrind_compensation::plan::MotionOutcome;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind_programs::rapid::Task;
@@ -85,6 +86,43 @@ fn whatever_a_correction_writes_is_no_difference() {
         let worst = report.points.iter().map(|point| point.after.unwrap().norm_mm()).fold(0.0, f64::max);
         assert!(worst < 1e-3, "{worst}");
     }
+}
+
+/// One call has one place: a contour cut by two routines was left without inserted targets.
+#[test]
+fn a_contour_in_several_routines_is_corrected_as_in_one() {
+    let line = |x: f64, y: f64| format!("    MoveL [[{x:.1},{y:.1},330.0],{PLACE},v100,fine,tool0;\n");
+    let corners = [[300.0, 10.0], [420.0, 10.0], [420.0, 230.0], [300.0, 230.0], [300.0, 10.0]]
+        .map(|[x, y]| line(x, y));
+    let program = |calls: &str| {
+        let [first, a, b, c, d] = &corners;
+        format!(
+            "MODULE M\n  PROC main()\n{first}{calls}  ENDPROC\n  PROC one()\n{a}{b}  ENDPROC\n  PROC two()\n{c}{d}  ENDPROC\nENDMODULE\n"
+        )
+    };
+    let known = estimated(perturbed(5, 3.0), &[Joints::zeros()]);
+    let options = Options { tolerance_mm: 0.005, ..Options::default() };
+    let corrected = |source: &str| {
+        let (planned, text) = rewritten(source.as_bytes(), &known, &Cell::default(), &options);
+        let inserted: u32 = planned.outcomes.iter().map(|outcome| outcome.inserted).sum();
+        (inserted, String::from_utf8(text).unwrap(), planned)
+    };
+    let whole = format!("MODULE M\n  PROC main()\n{}  ENDPROC\nENDMODULE\n", corners.concat());
+    let (in_one, ..) = corrected(&whole);
+    let split = program("    one;\n    two;\n");
+    let (in_two, text, planned) = corrected(&split);
+    assert!(in_one > 3 && in_two == in_one, "{in_one} {in_two}");
+    let unchecked = |outcome: &MotionOutcome| {
+        !matches!(outcome.reason(), None | Some(OutcomeReason::JointNotMeasured { .. }))
+    };
+    assert!(!planned.outcomes.iter().any(unchecked), "{:?}", planned.outcomes);
+    let report = judged_on(&split, &text, &perturbed(5, 3.0));
+    assert!(report.differences.is_empty(), "{:?}", report.differences);
+    let between = report.between.unwrap();
+    assert!(between.largest_mm.unwrap() < 0.01 && between.unchecked == 0, "{between:?} {text}");
+    // From two places no line has one start.
+    let (from_several, ..) = corrected(&program("    one;\n    two;\n    one;\n    two;\n"));
+    assert!(from_several < in_one, "{from_several}");
 }
 
 /// Behind a reversal a target that takes up the backlash is inserted a tenth of a millimetre from the corner: it was taken for the corner, and

@@ -55,7 +55,8 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::LineAsJoints { .. } => "line as joints",
         OutcomeReason::TooFast { .. } => "too fast",
         OutcomeReason::NoCircle => "no circle",
-        // tests/it/segment.rs.
+        // tests/it/circles.rs.
+        OutcomeReason::ArcFromUncorrected { .. } => "behind uncorrected",
         OutcomeReason::StartOfUnchangedArc { .. } => "before circle",
         // tests/it/cut.rs.
         OutcomeReason::StartOfUnchangedCut { .. } => "before a cut",

@@ -288,6 +288,15 @@ pub(super) struct Feed {
     pub(super) exact_stop_modal: bool,
 }
 
+/// Corners that the control rounds or chamfers itself.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Corners {
+    /// Whether every motion from here on ends in one (RNDM).
+    pub(super) modal: bool,
+    /// Whether the motion before ended in one.
+    pub(super) before: bool,
+}
+
 /// The abstract state of a control between two blocks.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ModalState {
@@ -313,6 +322,7 @@ pub(super) struct ModalState {
     pub(super) programmable_frame: Option<Pose>,
     pub(super) tool: ActiveTool,
     pub(super) feed: Feed,
+    pub(super) corners: Corners,
     /// The pole: the centre of the last CC (Heidenhain).
     pub(super) pole: [Evaluated; 2],
     pub(super) variables: Variables,
@@ -378,6 +388,7 @@ impl ModalState {
                 exact_stop: false,
                 exact_stop_modal: false,
             },
+            corners: Corners::default(),
             pole: [Err(Reason::PositionUnknown); 2],
             variables: Variables::default(),
             saved: None,
@@ -510,6 +521,8 @@ impl Lattice for ModalState {
         // A stop that not every path has is none: motions that may blend belong to one cut.
         self.feed.exact_stop &= other.feed.exact_stop;
         self.feed.exact_stop_modal &= other.feed.exact_stop_modal;
+        self.corners.modal |= other.corners.modal;
+        self.corners.before |= other.corners.before;
         if self.saved != other.saved {
             self.saved = None;
         }

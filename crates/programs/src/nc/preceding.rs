@@ -31,6 +31,11 @@ impl Preceding {
         self.motions.first().copied().filter(|_| !self.joined)
     }
 
+    /// All that are known.
+    pub(super) fn each(&self) -> impl Iterator<Item = u32> {
+        self.motions.iter().copied()
+    }
+
     /// Those before where paths have met; none where they are unknown.
     pub(super) fn of_paths(&self) -> Option<&[u32]> {
         (self.joined && !self.motions.is_empty()).then_some(&self.motions)

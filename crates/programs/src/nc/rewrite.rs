@@ -7,6 +7,7 @@
 
 mod restate;
 mod arcs;
+mod carried_axes;
 mod pinned_ends;
 mod line_length;
 mod control_state;
@@ -14,7 +15,7 @@ mod position_dependencies;
 mod block_writer;
 mod word_slots;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use nalgebra::UnitQuaternion;
 
@@ -27,7 +28,7 @@ use super::mark;
 use super::modal_state::OrientationMode;
 use super::orientation::{Angles, vector_and_spin};
 use super::task::{BlockContext, StateEvent, Task};
-use crate::edit::{EditError, Edits};
+use crate::edit::{EditError, Edits, line_end};
 use crate::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
 use crate::rewrite::{Change, Extra, FileEdits, NewTarget, RewriteOptions, RewriteOutcome, Rewritten};
 
@@ -57,20 +58,22 @@ impl Task<'_> {
         }
         let mut edits = vec![Edits::new(); self.trees.len()];
         let mut passes = 0;
+        let mut carried = self.carried_axes();
         while !wanted.is_empty() {
             edits.iter_mut().for_each(|edits| *edits = Edits::new());
             let pinned = self.find_pinned_ends(changes, &mut wanted, &mut outcomes);
-            if self.refuse_position_dependents(&pinned, &mut wanted, &mut outcomes) {
+            if self.refuse_position_dependents(&pinned, &mut wanted, &mut carried, &mut outcomes) {
                 // A refused motion becomes unmodified and may depend on other motions.
                 continue;
             }
+            let ends = MotionEnds { pinned: &pinned, carried: &carried };
             let unfit_arcs =
-                self.rewrite_motions((changes, &wanted), options, &pinned, &mut edits, &mut outcomes);
+                self.rewrite_motions((changes, &wanted), options, ends, &mut edits, &mut outcomes);
             // An arc that no circle fits becomes unmodified, and so does the motion that ends at its start.
             let mut again = false;
-            for motion in unfit_arcs {
+            for (motion, reason) in unfit_arcs {
                 if let Some(index) = wanted.remove(&motion) {
-                    outcomes[index] = RewriteOutcome::Refused(Reason::WrongShape);
+                    outcomes[index] = RewriteOutcome::Refused(reason);
                     again = true;
                 }
             }
@@ -107,22 +110,22 @@ impl Task<'_> {
     }
 
     /// Writes all motions in order: those of `wanted`, and restated words of the others. Returns the arcs that no
-    /// circle fits.
+    /// circle fits, with the reason.
     fn rewrite_motions(
         &self,
         (changes, wanted): (&[Change], &HashMap<u32, usize>),
         options: &RewriteOptions,
-        pinned: &BTreeSet<u32>,
+        ends: MotionEnds<'_>,
         edits: &mut Vec<Edits>,
         outcomes: &mut [RewriteOutcome],
-    ) -> Vec<u32> {
+    ) -> Vec<(u32, Reason)> {
         let mut rewriter = Rewriter {
             task: self,
             options,
             edits,
             control: ControlState::default(),
             unfit_arcs: Vec::new(),
-            pinned,
+            ends,
         };
         for event in &self.events {
             match *event {
@@ -218,10 +221,18 @@ struct Rewriter<'f, 's> {
     options: &'f RewriteOptions,
     edits: &'f mut Vec<Edits>,
     control: ControlState,
-    /// Arcs that no circle fits.
-    unfit_arcs: Vec<u32>,
-    /// Motions with a pinned end point.
+    /// Arcs that no circle fits, with the reason.
+    unfit_arcs: Vec<(u32, Reason)>,
+    ends: MotionEnds<'f>,
+}
+
+/// Motions that do not end where a change, or the original, has them.
+#[derive(Clone, Copy)]
+struct MotionEnds<'f> {
+    /// With a change, but at the original end point.
     pinned: &'f BTreeSet<u32>,
+    /// Without a change, but in these axes where the motion before them ends.
+    carried: &'f BTreeMap<u32, u8>,
 }
 
 impl<'s> Rewriter<'_, 's> {
@@ -243,7 +254,7 @@ impl<'s> Rewriter<'_, 's> {
         };
         let start = self.control.start(context);
         let new = change.and_then(|change| goal_of(motion, change)).map(|goal| {
-            match self.pinned.contains(&index) {
+            match self.ends.pinned.contains(&index) {
                 true => Goal { position: to.position_mm, rotation: None, via: goal.via },
                 false => goal,
             }
@@ -253,20 +264,29 @@ impl<'s> Rewriter<'_, 's> {
             self.update_after_motion(&to, context, None);
             return RewriteOutcome::Unchanged;
         }
-        let original = Goal { position: to.position_mm, rotation: None, via: via_of(motion) };
+        let carried = self.ends.carried.get(&index).copied().unwrap_or(0);
+        let position = std::array::from_fn(|axis| match start[axis].filter(|from| !from.is_nan()) {
+            Some(from) if carried & 1 << axis != 0 => from,
+            _ => to.position_mm[axis],
+        });
+        let original = Goal { position, rotation: None, via: via_of(motion) };
         let mut goal = new.unwrap_or(original);
         let mut arc = None;
         let mut outcome = RewriteOutcome::Unchanged;
-        if context.arc.is_some() && !straightens {
+        if let Some(block_arc) = context.arc
+            && !straightens
+        {
             let by_radius = task.block_words(motion, context).2.radius.is_some();
             let intended =
                 all(context.start).zip(via_of(motion)).map(|(from, via)| [from, via, to.position_mm]);
             arc = intended.and_then(|intended| self.arc(&mut goal, start, context, (intended, by_radius)));
             if arc.is_none() {
-                self.unfit_arcs.push(index);
+                let reason =
+                    if block_arc.arc.is_full_circle() { Reason::OpenCircle } else { Reason::WrongShape };
+                self.unfit_arcs.push((index, reason));
                 // No circle fits: the motion is refused.
                 if change.is_some() {
-                    outcome = RewriteOutcome::Refused(Reason::WrongShape);
+                    outcome = RewriteOutcome::Refused(reason);
                     goal = Goal { position: to.position_mm, rotation: None, via: via_of(motion) };
                     arc = intended
                         .and_then(|intended| self.arc(&mut goal, start, context, (intended, by_radius)));
@@ -630,13 +650,4 @@ fn goal_of(motion: &Motion, change: &Change) -> Option<Goal> {
     let mut goal = goal?;
     goal.via = via;
     Some(goal)
-}
-
-/// The line end that a file uses.
-pub(super) fn line_end(source: &[u8]) -> &'static [u8] {
-    match source.iter().position(|&byte| byte == b'\n') {
-        None if source.contains(&b'\r') => b"\r",
-        Some(at) if at > 0 && source[at - 1] == b'\r' => b"\r\n",
-        _ => b"\n",
-    }
 }

@@ -168,6 +168,8 @@ fn space(input: Bytes<'_>, at: usize, tree: &mut Tree<'_, Token, Syntax>) -> usi
     while let Some(&byte) = input.get(index) {
         match byte {
             b'\n' => tree.line_starts(at + index + 1),
+            // A carriage return alone ends a line too.
+            b'\r' if input.get(index + 1) != Some(&b'\n') => tree.line_starts(at + index + 1),
             byte if is_space(byte) => {}
             _ => break,
         }

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::syntax::{RapidTree, Syntax, node_kind, parts, token_kind, tokens_of};
 use super::token::Token;
-use crate::edit::Edits;
+use crate::edit::{Edits, line_end};
 use crate::motion::{Mark, is_uncorrected_comment};
 use crate::tree::whole_line;
 
@@ -163,16 +163,9 @@ fn place(tree: &RapidTree<'_>, module: u32) -> (usize, bool) {
     }
     let span = tree.range(node.first, node.end);
     let behind = tree.range(node.first, head).end;
-    match tree.source()[behind..span.end].iter().position(|&byte| byte == b'\n') {
+    let last = line_end(tree.source()).last();
+    match tree.source()[behind..span.end].iter().position(|byte| Some(byte) == last) {
         Some(line) => (behind + line + 1, true),
         None => (behind, false),
-    }
-}
-
-/// The line end that a file uses.
-pub fn line_end(source: &[u8]) -> &'static [u8] {
-    match source.iter().position(|&byte| byte == b'\n') {
-        Some(at) if at > 0 && source[at - 1] == b'\r' => b"\r\n",
-        _ => b"\n",
     }
 }

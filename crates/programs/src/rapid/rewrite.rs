@@ -16,7 +16,7 @@ use super::mark;
 use super::print::{self, NewValue};
 use super::task::Task;
 use super::token::{Token, folded, keyword, same_name};
-use crate::edit::{EditError, Edits};
+use crate::edit::{EditError, Edits, line_end};
 use crate::motion::{Motion, MotionKind, Offset, Origin, Reason, Span, TargetValue};
 use crate::rewrite::{Change, FileEdits, NewTarget, RewriteOptions, RewriteOutcome, Rewritten};
 
@@ -458,14 +458,14 @@ impl<'r, 's> Rewriter<'r, 's> {
         let joints = matches!(old, TargetValue::Joint(_));
         // After the declaration and a comment on the same line.
         let end = declaration.statement.end as usize;
-        let line = source[end..].iter().position(|&byte| byte == b'\n').map_or(source.len(), |at| end + at);
+        let line = source[end..].iter().position(ends_line).map_or(source.len(), |at| end + at);
         let rest = source[end..line].trim_ascii();
         let at = if rest.is_empty() || rest[0] == b'!' {
             end + source[end..line].trim_ascii_end().len()
         } else {
             end
         };
-        let mut text = mark::line_end(source).to_vec();
+        let mut text = line_end(source).to_vec();
         text.extend_from_slice(indent(source, declaration.statement.start as usize));
         text.extend_from_slice(if local { b"LOCAL CONST " } else { b"CONST " });
         text.extend_from_slice(if joints { b"jointtarget " } else { b"robtarget " });
@@ -573,7 +573,7 @@ fn circle_point(source: &[u8], motion: &Motion) -> Option<[std::ops::Range<usize
                 let blanks = source[at + 1..].iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
                 return Some([argument, at..at + 1 + blanks]);
             }
-            b'!' => at += source[at..].iter().take_while(|&&byte| byte != b'\n').count(),
+            b'!' => at += source[at..].iter().take_while(|byte| !ends_line(byte)).count(),
             _ => at += 1,
         }
     }
@@ -602,9 +602,14 @@ fn worse(a: RewriteOutcome, b: RewriteOutcome) -> RewriteOutcome {
     if rank(&b) > rank(&a) { b } else { a }
 }
 
+/// Whether a byte ends a line; of two, either does.
+fn ends_line(byte: &u8) -> bool {
+    matches!(byte, b'\n' | b'\r')
+}
+
 /// The white space before a statement on its line.
 fn indent(source: &[u8], statement: usize) -> &[u8] {
-    let line = source[..statement].iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
+    let line = source[..statement].iter().rposition(ends_line).map_or(0, |at| at + 1);
     let blank = source[line..statement].iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
     &source[line..line + blank]
 }

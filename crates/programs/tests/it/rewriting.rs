@@ -303,6 +303,32 @@ fn a_changed_file_is_marked_once_and_an_unchanged_one_not() {
     assert_eq!(rewritten.files[0].edits.len(), 1);
 }
 
+/// New lines ended with line feeds, and a declaration before a comment went to the end of the file.
+#[test]
+fn a_file_whose_lines_end_with_carriage_returns_alone_keeps_them() {
+    let source = module(
+        &format!("  CONST robtarget p:=[[500,0,300],[0,0,1,0],[0,0,0,0],{EXT}]; ! here\n  VAR num n;\n"),
+        "  MoveL p,v100,z1,tool0;\n  MoveL p,v100,fine,tool0;\n",
+    );
+    let extra = Extra { kind: MotionKind::Linear, target: at(490.0, 1.0, 300.0), external: None };
+    let changes = [
+        change(0, at(501.0, 0.0, 300.0)),
+        Change { before: vec![extra], ..change(1, at(502.0, 0.0, 300.0)) },
+    ];
+    let mark = Mark { version: "0.1.0".into(), model: "abc".into(), partial: false };
+    let options = RewriteOptions { mark: Some(mark), ..RewriteOptions::default() };
+    let corrected = |source: &str| {
+        let task = Task::read(&[("m.mod", source.as_bytes())]);
+        let lines: Vec<u32> = task.listing.motions.iter().map(|motion| motion.place.line).collect();
+        let edits = &task.rewrite(&changes, &options).unwrap().files[0].edits;
+        (lines, String::from_utf8(edits.apply(source.as_bytes()).unwrap()).unwrap())
+    };
+    let (lines, text) = corrected(&source);
+    assert_eq!(lines, [5, 6]);
+    assert!(text.lines().count() == source.lines().count() + 3, "{text}");
+    assert_eq!(corrected(&source.replace('\n', "\r")), (lines, text.replace('\n', "\r")));
+}
+
 #[test]
 fn each_changed_module_is_marked_behind_its_head() {
     let mark = Mark { version: "0.1.0".into(), model: "abc".into(), partial: false };

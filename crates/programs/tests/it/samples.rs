@@ -180,6 +180,7 @@ fn every_reason_to_leave_a_motion_has_a_sample() {
         Reason::BeforeIncrement,
         Reason::BeforeOmitted,
         Reason::LineTooLong,
+        Reason::OpenCircle,
     ];
     let missing: Vec<_> =
         Reason::ALL.iter().filter(|reason| !seen.contains(reason) && !rewriting.contains(reason)).collect();

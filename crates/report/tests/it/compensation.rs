@@ -203,8 +203,9 @@ fn a_cut_that_stays_names_the_line_that_caused_it() {
 #[test]
 fn motions_that_are_kept_for_the_sake_of_others_share_a_group_whatever_the_line() {
     let (mut plan, listing, files) = example();
-    let for_other: [fn(u32) -> OutcomeReason; 6] = [
+    let for_other: [fn(u32) -> OutcomeReason; 7] = [
         |line| OutcomeReason::HalfTurn { line },
+        |line| OutcomeReason::ArcFromUncorrected { line },
         |line| OutcomeReason::StartOfUnchangedArc { line },
         |line| OutcomeReason::StartOfUnchangedCut { line },
         |line| OutcomeReason::DepartureFromUnchangedCut { line },
@@ -218,7 +219,7 @@ fn motions_that_are_kept_for_the_sake_of_others_share_a_group_whatever_the_line(
         assert_eq!(table.rows.len(), 1, "{index}");
         let text = csv::table(&table);
         assert!(text.contains("lines 20, 21, 22, 23 and 3 more)"), "{text}");
-        assert_eq!(text.contains("joint 3, lines"), index == 5, "{text}");
+        assert_eq!(text.contains("joint 3, lines"), index == 6, "{text}");
     }
 }
 
@@ -365,7 +366,10 @@ fn a_work_object_without_a_corrected_motion_is_not_called_corrected() {
         remedy: None,
     }];
     let said = |plan: &Plan| sentences(plan, &listing).join("\n");
-    assert!(said(&plan).contains("wobj0: shape and placement are corrected; the path as a whole"));
+    assert!(
+        said(&plan)
+            .contains("wobj0: shape and placement are corrected in 3 of 7 motions; the path as a whole")
+    );
     plan.outcomes.iter_mut().for_each(|outcome| outcome.status = MotionStatus::Left);
     let text = said(&plan);
     assert!(

@@ -6,7 +6,7 @@ use super::Pair;
 use super::follow::{Follower, off, plane_of};
 use crate::arm::{Pose, difference};
 use crate::nc::arc::axes;
-use crate::nc::machine::{Event, Move, Say};
+use crate::nc::machine::{Event, Mode, Move, Say};
 use crate::outcome::{Dialect, Disagreement, Tally};
 use crate::stated::Stated;
 use crate::under_test::{Row, Status};
@@ -31,6 +31,7 @@ pub fn compare(pair: &Pair<'_>, before: &[Event], after: &[Event], whole: bool) 
         arm_before: Follower::new(pair.case, pair.seed),
         most: 0.0,
         open_before: 0.0,
+        before_cycle: false,
     };
     let mut old = before.iter();
     for new in after {
@@ -41,13 +42,15 @@ pub fn compare(pair: &Pair<'_>, before: &[Event], after: &[Event], whole: bool) 
             }
             continue;
         }
-        let Some(old) = old.next() else {
+        let Some(this) = old.next() else {
             if whole {
                 judge.wrong(0, "more-events", format!("{new:?}"));
             }
             return judge.tally;
         };
-        judge.event(old, new);
+        judge.before_cycle =
+            matches!(old.as_slice().first(), Some(Event::Elsewhere(_, text, _)) if text.contains("G81"));
+        judge.event(this, new);
         if !judge.tally.disagreements.is_empty() {
             return judge.tally;
         }
@@ -67,6 +70,8 @@ struct Judge<'j> {
     most: f64,
     /// What is stated of the end of the motion before (mm).
     open_before: f64,
+    /// Whether the motion leads to a canned cycle.
+    before_cycle: bool,
 }
 
 impl Judge<'_> {
@@ -223,13 +228,14 @@ impl Judge<'_> {
         }
     }
 
-    /// A motion that is left goes where it always went, also in the axes that it does not say. Only moves to a place of the machine go on
-    /// there from where the motion before ended: nothing is cut by them.
+    /// A motion that is left goes where it always went, also in the axes that it does not say. Only moves to a place of the machine, and rapid
+    /// ones to a cycle, go on there from where the motion before ended: nothing is cut by them.
     fn left(&mut self, old: &Move, new: &Move, reason: &str) {
         let line = old.line + 1;
         let stated = old.words.place.map(|say| matches!(say, Some(Say::To(_))));
         let of_machine = reason.contains("machine coordinates") || reason.contains("reference point");
-        let asked = if of_machine { stated } else { [true; 3] };
+        let of_cycle = self.before_cycle && old.mode == Mode::Rapid;
+        let asked = if of_machine || of_cycle { stated } else { [true; 3] };
         if let Some(off) = apart(old.origin, old.to, new.origin, new.to, asked, LEFT_MM) {
             return self.wrong(line, "left-moved", format!("{off} ({reason})"));
         }

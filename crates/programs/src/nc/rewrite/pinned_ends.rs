@@ -99,7 +99,7 @@ impl Task<'_> {
 
     /// Whether the axes of two motions have different or unknown directions (ROT, another work offset): then each
     /// axis of one depends on all axes of the other.
-    fn axes_differ(&self, one: u32, other: u32) -> bool {
+    pub(super) fn axes_differ(&self, one: u32, other: u32) -> bool {
         let listing = &self.listing;
         let [Some(a), Some(b)] = [one, other].map(|index| listing.motions[index as usize].work_object) else {
             return false;

@@ -7,7 +7,7 @@
 //! positions at all branches, and the origin on all places where origins are set; both sets are collected over the
 //! whole file and substituted at its end, which accounts for loops and backward jumps.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::keeps_endpoint;
 use super::word_slots::{WordSlots, states_increment};
@@ -23,6 +23,8 @@ const SINGLE: usize = 4;
 
 /// X, Y, Z, A, B, C.
 const AXES: usize = 6;
+/// All of them as bits.
+const ALL: u8 = 0b11_1111;
 
 /// What a coordinate depends on.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -127,6 +129,8 @@ struct FileDependencies {
     file_motions: std::ops::Range<u32>,
     /// Whether the axis directions may change anywhere in the file: joins then mix axes.
     mixes_axes: bool,
+    /// The axes that the canned cycle before has stated: a block that repeats it there takes its word, wherever the tool has returned to.
+    stated_by_cycle: [bool; 3],
 }
 
 /// The causes in [`FileDependencies::pinned`].
@@ -145,6 +149,9 @@ impl FileDependencies {
     }
 
     fn event(&mut self, event: &StateEvent) {
+        if !matches!(event, StateEvent::AxesUnknown(_)) {
+            self.stated_by_cycle = [false; 3];
+        }
         match *event {
             StateEvent::OriginSet { stated, named } => {
                 for axis in (0..3).filter(|&axis| named[axis]) {
@@ -214,11 +221,13 @@ impl FileDependencies {
 }
 
 impl Task<'_> {
-    /// Refuses the motions on whose end points unmodified words depend. Returns whether there are any.
+    /// Refuses the motions on whose end points unmodified words depend, and puts those of `carried` back in all axes. Returns whether there
+    /// are any.
     pub(super) fn refuse_position_dependents(
         &self,
         pinned: &BTreeSet<u32>,
         wanted: &mut HashMap<u32, usize>,
+        carried: &mut BTreeMap<u32, u8>,
         outcomes: &mut [RewriteOutcome],
     ) -> bool {
         let mut state = FileDependencies::default();
@@ -247,7 +256,8 @@ impl Task<'_> {
                 StateEvent::Motion(motion) => {
                     state.file_motions.end = motion + 1;
                     let moves = wanted.contains_key(&motion) && !pinned.contains(&motion);
-                    self.transfer(motion, moves, &mut state);
+                    let moved = if moves { ALL } else { carried.get(&motion).copied().unwrap_or(0) };
+                    self.transfer(motion, moved, &mut state);
                 }
                 _ => state.event(event),
             }
@@ -255,6 +265,7 @@ impl Task<'_> {
         end(&state);
         let mut any = false;
         for (motion, reason) in refused {
+            any |= !wanted.contains_key(&motion) && carried.remove(&motion).is_some();
             if let Some(change) = wanted.remove(&motion) {
                 outcomes[change] = RewriteOutcome::Refused(reason);
                 any = true;
@@ -282,17 +293,20 @@ impl Task<'_> {
         }
     }
 
-    /// The transfer function of a motion.
-    fn transfer(&self, index: u32, moves: bool, state: &mut FileDependencies) {
+    /// The transfer function of a motion that does not end at its original place in the axes `moved` (bits).
+    fn transfer(&self, index: u32, moved: u8, state: &mut FileDependencies) {
         let (motion, context) = (&self.listing.motions[index as usize], &self.contexts[index as usize]);
         let known = motion.to().is_some_and(|target| target.value.is_ok());
         if known {
             self.pin_path_dependent_increments(index, state);
         }
+        let stated_by_cycle = std::mem::take(&mut state.stated_by_cycle);
         if known && motion.own_reason.is_none_or(keeps_endpoint) {
             // It is rewritten, or omitted words are restated.
-            let dependencies = if moves { Dependencies::on_motion(index) } else { Dependencies::NONE };
-            state.position = [dependencies; AXES];
+            state.position = std::array::from_fn(|axis| match moved & 1 << axis {
+                0 => Dependencies::NONE,
+                _ => Dependencies::on_motion(index),
+            });
             return;
         }
         let (tree, dialect, slots) = self.block_words(motion, context);
@@ -336,6 +350,7 @@ impl Task<'_> {
                 (Some(_), Some(true)) => state.pin_position(INCREMENT, axis),
                 // A canned cycle may return to the level at which it began (G98), whatever its words state.
                 (Some(_), _) if cycle && linear => {
+                    state.stated_by_cycle[axis] = !motion.conditional && !context.may_omit_words;
                     state.pin_origin(axis);
                     state.position[axis] = was.union(state.origin[axis]);
                 }
@@ -346,6 +361,7 @@ impl Task<'_> {
                     state.position[axis] =
                         if linear && !returns { state.origin[axis] } else { Dependencies::NONE };
                 }
+                (None, _) if cycle && linear && stated_by_cycle[axis] => state.stated_by_cycle[axis] = true,
                 // It ends where the motion before does in this axis.
                 // Where the motion before ended is not restated behind a join, at which it is open.
                 (None, _) if linear && gets_words && start.is_some() && !was.branches => {}

@@ -58,8 +58,10 @@ pub(super) struct Flags {
     pub(super) rapid: bool,
     /// TURN, AR, I1, J1, K1: arcs of several turns, by their angle, or through a point.
     pub(super) special_arc: bool,
-    /// Rounded or chamfered corners: `,R5`, `,C2`, RND=, CHF=, CHR=.
+    /// A rounded or chamfered corner at its end: `,R5`, `,C2`, RND=, CHF=, CHR=.
     pub(super) corner: bool,
+    /// The same at the end of every block from here on, or no longer: RNDM=.
+    pub(super) modal_corner: Option<bool>,
 }
 
 impl Block<'_> {

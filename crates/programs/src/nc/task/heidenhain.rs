@@ -253,21 +253,37 @@ impl<'s> Interpreter<'_, 's> {
 
     /// Blocks with unsupported paths. True if the block is one of them.
     fn path_block(&mut self, block: &Block<'_>, name: &[u8]) -> bool {
+        if matches!(name, b"RND" | b"CHF") {
+            self.round_corner(block, name);
+            return true;
+        }
         let dependency = match name {
-            b"RND" | b"CHF" | b"FPOL" => StartDependency::Independent,
+            b"FPOL" => StartDependency::Independent,
             b"CP" | b"LP" | b"FC" | b"FL" | b"SPL" => StartDependency::Position,
             b"APPR" | b"DEP" | b"CTP" | b"FLT" | b"FCT" => StartDependency::Tangent,
             _ => return false,
         };
-        let preceding = self.state.preceding.clone();
         self.list_left_path(block, &String::from_utf8_lossy(name), dependency);
-        if matches!(name, b"RND" | b"CHF") {
-            // They round or chamfer the corner of their neighbours; the next block is relative to the corner.
-            self.state.preceding = preceding;
-        } else {
-            self.invalidate_position();
-        }
+        self.invalidate_position();
         true
+    }
+
+    /// RND and CHF round or chamfer the corner between their neighbours; the next block is relative to the corner.
+    fn round_corner(&mut self, block: &Block<'_>, name: &[u8]) {
+        let preceding = self.state.preceding.clone();
+        self.list_left(block, &String::from_utf8_lossy(name), Reason::RoundedCorner);
+        for index in preceding.each() {
+            let index = index as usize;
+            // A motion that a jump leads back from is not listed yet.
+            if let (Some(motion), Some(context)) =
+                (self.listing.motions.get_mut(index), self.contexts.get_mut(index))
+            {
+                motion.own_reason = motion.own_reason.or(Some(Reason::RoundedCorner));
+                context.start_dependency = context.start_dependency.max(StartDependency::Position);
+            }
+        }
+        self.state.preceding = preceding;
+        self.state.corners.before = true;
     }
 
     /// `FN 0: Q1 = +5`, `Q1 = +5`.

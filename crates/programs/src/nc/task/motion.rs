@@ -63,6 +63,7 @@ impl Interpreter<'_, '_> {
     }
 
     fn list_left_as(&mut self, block: &Block<'_>, (name, kind): (&str, MotionKind), reason: Reason) {
+        self.state.corners.before = false;
         let mut motion = self.new_motion(block, name, kind);
         motion.own_reason = Some(reason);
         let context = self.block_context(block, None);
@@ -90,6 +91,8 @@ impl Interpreter<'_, '_> {
             }
             MotionMode::Unsupported(Reason::UnsupportedPath) => StartDependency::Position,
             _ if block.unmodelled == Some(Reason::UnsupportedPath) => StartDependency::Position,
+            // A control makes a corner only of lines in its working plane.
+            _ if self.ends_in_corner(block, mode) => StartDependency::Position,
             // No word can be added to a block with R+, and no A, B, C to such an LN: the omitted values stay in
             // effect.
             _ if block.flags.paraxial_compensation => StartDependency::Position,
@@ -98,6 +101,12 @@ impl Interpreter<'_, '_> {
             }
             _ => StartDependency::Independent,
         }
+    }
+
+    /// Whether the control rounds or chamfers the corner at the end of a block.
+    fn ends_in_corner(&self, block: &Block<'_>, mode: MotionMode) -> bool {
+        let cuts = matches!(mode, MotionMode::Linear | MotionMode::Circular(_));
+        block.flags.corner || cuts && self.state.corners.modal
     }
 
     fn block_context(&self, block: &Block<'_>, arc: Option<BlockArc>) -> BlockContext {
@@ -205,6 +214,9 @@ impl Interpreter<'_, '_> {
         let corner = self.dialect.paren_comments() && straight && bends;
         let circular = matches!(mode, MotionMode::Circular(_));
         self.note_other_axes(block);
+        if let Some(on) = block.flags.modal_corner {
+            self.state.corners.modal = on;
+        }
         if !(block.has_motion_words() || circular && bends || vector_words && has_centre) {
             self.block_without_axes(block, mode);
             return;
@@ -228,6 +240,8 @@ impl Interpreter<'_, '_> {
         let to = self.end_position(block, &from);
         let (name, kind) = name_and_kind(mode, heidenhain);
         let mut motion = self.new_motion(block, name, kind);
+        let ends_in_corner = self.ends_in_corner(block, mode);
+        let behind_corner = std::mem::replace(&mut self.state.corners.before, ends_in_corner);
         let (old, old_rotation) = (self.state.orientation, self.state.rotation(self.angles));
         self.set_orientation(block, vector_words);
         let rotation = self.state.rotation(self.angles);
@@ -237,6 +251,9 @@ impl Interpreter<'_, '_> {
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
         motion.own_reason = self.reason_to_leave(block, mode, machine, &motion);
+        if motion.own_reason.is_none() && (behind_corner || ends_in_corner) {
+            motion.own_reason = Some(Reason::RoundedCorner);
+        }
         if corner && motion.own_reason.is_none() {
             motion.own_reason = Some(Reason::UnsupportedPath);
         }
@@ -395,8 +412,10 @@ impl Interpreter<'_, '_> {
             && self.state.groups.active_transforms() == 0
             && self.state.unknown_reason(set_before_branch).is_none()
             && match motion.own_reason {
-                None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
-                Some(Reason::UnsupportedPath) => block.flags.corner,
+                None
+                | Some(
+                    Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord | Reason::RoundedCorner,
+                ) => true,
                 Some(Reason::Cycle) => call.is_some(),
                 _ => false,
             }
@@ -578,8 +597,6 @@ impl Interpreter<'_, '_> {
             Some(Reason::Unreadable)
         } else if block.flags.skippable {
             Some(Reason::Skippable)
-        } else if block.flags.corner {
-            Some(Reason::UnsupportedPath)
         } else if let MotionMode::Unsupported(reason) = mode {
             Some(reason)
         } else if machine {

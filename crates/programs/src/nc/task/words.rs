@@ -120,9 +120,7 @@ impl<'s> Interpreter<'_, 's> {
             Some(b'C') if heidenhain && word.value == WordValue::Absent => {}
             Some(b'C' | b'R') if comma => block.flags.corner = true,
             // `,A45.`: the angle of the line.
-            Some(_) if comma => {
-                (block.flags.corner, block.unmodelled) = (true, Some(Reason::UnsupportedPath))
-            }
+            Some(_) if comma => block.unmodelled = Some(Reason::UnsupportedPath),
             Some(letter @ (b'A' | b'B' | b'C')) => put(&mut block.abc[usize::from(letter - b'A')]),
             Some(letter @ (b'I' | b'J' | b'K')) => put(&mut block.centre[usize::from(letter - b'I')]),
             Some(b'R') if heidenhain => match (word.value, self.literal(&word)) {
@@ -177,7 +175,9 @@ impl<'s> Interpreter<'_, 's> {
             (Dialect::Siemens, b"CR") => block.radius = at,
             (Dialect::Siemens, b"TURN" | b"AR" | b"I1" | b"J1" | b"K1") => block.flags.special_arc = true,
             (Dialect::Siemens, b"RND" | b"CHF" | b"CHR") => block.flags.corner = true,
-            (Dialect::Siemens, b"RNDM") => block.flags.corner = self.evaluate_word(&word).0 != Ok(0.0),
+            (Dialect::Siemens, b"RNDM") => {
+                block.flags.modal_corner = Some(self.evaluate_word(&word).0 != Ok(0.0));
+            }
             (Dialect::Siemens, b"SUPA" | b"G153") => block.flags.machine_coordinates = true,
             (Dialect::Siemens, _) => self.collect_siemens_name(block, index, &name),
             (Dialect::Heidenhain, [b'I', letter @ b'X'..=b'Z']) => {

@@ -1,10 +1,9 @@
 //! Motions inserted before another: they take its speed, tool, work object and process.
 
 use super::{Rewriter, circle_point, fresh, indent, instruction_of, written_as};
-use crate::edit::Edits;
+use crate::edit::{Edits, line_end};
 use crate::motion::{Motion, MotionKind, Role, Span, TargetValue};
 use crate::rapid::instruction::{InsertedForm, Instruction, Slot};
-use crate::rapid::mark;
 use crate::rapid::parser::parse_statement;
 use crate::rapid::print;
 use crate::rapid::syntax::{RapidTree, Syntax, arguments, tokens_of};
@@ -25,7 +24,7 @@ impl Rewriter<'_, '_> {
         for extra in &change.before {
             let Some(written) = written_as(instruction, change) else { return };
             self.extra(&mut text, motion, written, source, &parts, extra);
-            text.extend_from_slice(mark::line_end(source));
+            text.extend_from_slice(line_end(source));
             text.extend_from_slice(indent(source, start));
         }
         self.edits[motion.place.file as usize].insert(start, &text);

@@ -41,7 +41,8 @@ fn number(line: &str, letter: char) -> f64 {
 
 #[test]
 fn an_arc_with_a_pinned_start_does_not_change_its_radius() {
-    let refused = [RewriteOutcome::Refused(Reason::BeforeUnmodifiedArc), RewriteOutcome::Refused(WrongShape)];
+    let refused =
+        [RewriteOutcome::Refused(Reason::BeforeUnmodifiedArc), RewriteOutcome::Refused(Reason::OpenCircle)];
     // The quarter starts at the end of an unmodified arc: only its end would move.
     let (text, outcomes) =
         run(Heidenhain, "CC X+6 Y+2\nC X+1 Y+2 DR+\nCR X+0 Y+3 R+1 DR+\nL X+0 Y+9", [0.0; 2]);

@@ -135,16 +135,17 @@ fn a_call_without_a_tool_keeps_tool_and_position() {
 
 #[test]
 fn a_rounded_or_chamfered_corner_keeps_its_ends() {
-    let path = left(UnsupportedPath);
+    // A control makes a corner in its working plane alone, which corrected lines leave.
+    let path = left(RoundedCorner);
     for corner in ["RND R2", "RND R2 F100", "CHF 3"] {
-        check(Heidenhain, &[(&format!("L X+20\n{corner}\nL Y+30\nL IX+5"), &[None, path, None, None])]);
-        assert_eq!(after(&format!("L X+20\n{corner}\nL IY+30"))[2], Ok([20.0, 32.0, 3.0]));
+        check(Heidenhain, &[(&format!("L X+20\n{corner}\nL Y+30\nL IX+5"), &[path, path, path, None])]);
+        assert_eq!(after(&format!("L X+20\n{corner}\nL IY+30\nL IX+5"))[3], Ok([25.0, 32.0, 3.0]));
         // An arc after it starts at the end of the line that it rounds.
         check(
             Heidenhain,
             &[(
                 &format!("L X+20 Y+0\n{corner}\nCC X+20 Y+10\nC X+30 Y+10 DR+\nL Z+9"),
-                &[left(BeforeUnmodifiedArc), path, left(CentreElsewhere), None],
+                &[path, path, left(CentreElsewhere), None],
             )],
         );
     }

@@ -7,6 +7,22 @@ use truegrind_programs::rewrite::RewriteOutcome;
 use super::default_deny::{HEAD, begin};
 use super::{change_of, rewrite_as};
 
+/// A file whose lines end with carriage returns alone counted as one line.
+#[test]
+fn lines_that_end_with_carriage_returns_are_lines() {
+    for dialect in [Siemens, LinuxCnc] {
+        let blocks: String = (0..60).map(|k| format!("X{k}. Y2. Z3.\n")).collect();
+        let source = format!("{HEAD}{}{blocks}", begin(dialect)).replace('\n', "\r");
+        let (text, rewritten) = rewrite_as(&source, dialect, |listing| {
+            (1..50).map(|motion| change_of(listing, motion, [1.2345, 2.3456, 3.4567])).collect()
+        });
+        assert!(
+            rewritten.outcomes.iter().all(|outcome| *outcome == RewriteOutcome::InPlace),
+            "{dialect:?} {text}"
+        );
+    }
+}
+
 /// The class: a correction adds decimals and words until the line no longer fits the control, which refuses the file
 /// or truncates the line. Such a motion is refused, and so is one whose end only a full line could restate.
 #[test]
