@@ -66,7 +66,7 @@ pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
         .collect();
     let of = |placement: &ObjectPlacement| {
         if names(placement).any(|name| corrected.contains(name)) {
-            return sentence(placement, what);
+            return sentence(placement, what, &share(placement, plan, listing));
         }
         let with = if placement.others.is_empty() { "it" } else { "them" };
         let named = named(placement, what);
@@ -75,6 +75,18 @@ pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
     let apart = apart(plan, what, |placement| names(placement).any(|name| corrected.contains(name)));
     let left = plan.placements.iter().filter_map(|placement| left_behind(placement, plan, listing));
     plan.placements.iter().map(of).chain(apart).chain(left).collect()
+}
+
+/// How many of the motions with a work object are corrected, where not all are.
+fn share(placement: &ObjectPlacement, plan: &Plan, listing: &Listing) -> String {
+    let is_here = |outcome: &&MotionOutcome| {
+        let object =
+            listing.motions.get(outcome.motion as usize).and_then(|motion| listing.work_object(motion));
+        object.is_some_and(|object| names(placement).any(|name| name == object.name))
+    };
+    let all = plan.outcomes.iter().filter(is_here).count();
+    let corrected = rewritten(plan).filter(is_here).count();
+    if corrected < all { format!(" in {corrected} of {all} motions") } else { String::new() }
 }
 
 /// By how much cuts may come apart without a word (mm RMS).
@@ -156,22 +168,22 @@ fn object_word(listing: &Listing) -> &'static str {
     if listing.numbered { "work offset" } else { "work object" }
 }
 
-fn sentence(placement: &ObjectPlacement, what: &str) -> String {
+fn sentence(placement: &ObjectPlacement, what: &str, share: &str) -> String {
     let ObjectPlacement { applied, probability_of_harm, remedy, unlocated, .. } = placement;
     let (named, known) = (named(placement, what), displacement(placement));
     if *applied == Placement::Absolute {
-        return format!("{named}: shape and placement are corrected; {known}");
+        return format!("{named}: shape and placement are corrected{share}; {known}");
     }
     if *unlocated {
         return format!(
-            "{named}: only the shape is corrected, since the {what} was taught with this arm and its teaching points are missing; give them in the cell \
+            "{named}: only the shape is corrected{share}, since the {what} was taught with this arm and its teaching points are missing; give them in the cell \
              file (teaching_deg) to correct the placement too; --placement absolute \
              takes the programmed frame as exact"
         );
     }
     let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(
-        "{named}: only the shape is corrected; {known}; correcting the placement too would make the path worse with a probability of \
+        "{named}: only the shape is corrected{share}; {known}; correcting the placement too would make the path worse with a probability of \
          {}; {remedy}--placement absolute corrects it anyway",
         percent_of(*probability_of_harm)
     )
