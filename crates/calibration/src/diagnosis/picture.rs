@@ -6,7 +6,8 @@ use super::cause::Cause;
 use super::design::Design;
 use super::extension::Subject;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
-use crate::measurement::sensor::disturbance::{Kind, Profile};
+use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
+use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::effect::Effect;
 
 /// Label and unit of an axis.
@@ -95,12 +96,24 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &De
 /// Horizontal axis for a cause of the measurement or a thermal cause.
 fn across<'d>(cause: &Cause, dataset: &'d Dataset) -> (Label, Box<dyn Fn(usize) -> f64 + 'd>) {
     match cause {
-        Cause::Measurement(d) if matches!(d.kind, Kind::Scale | Kind::Sag) => (
+        // What changes from some row on is shown over the rows.
+        Cause::Measurement(d) if matches!(d.kind, Kind::Scale | Kind::Sag) && cause.rows().is_none() => (
             ("distance from the sensor".to_owned(), "mm"),
-            Box::new(|i| match &dataset.rows[i].reading {
-                Reading::Cable(l) => *l,
-                Reading::Position(p) => p.norm(),
-                Reading::Pose(p) => p.translation.vector.norm(),
+            Box::new(|i| distance_mm(&dataset.rows[i].reading)),
+        ),
+        Cause::Measurement(Disturbance { kind: Kind::Empirical(EmpiricalFault::CableReversal), .. }) => (
+            ("change of the reading from the row before".to_owned(), "mm"),
+            Box::new(|i| {
+                let before =
+                    i.checked_sub(1).map_or(f64::NAN, |before| distance_mm(&dataset.rows[before].reading));
+                distance_mm(&dataset.rows[i].reading) - before
+            }),
+        ),
+        Cause::Measurement(Disturbance { kind: Kind::Empirical(EmpiricalFault::Lens), .. }) => (
+            ("angle from the axis of the camera".to_owned(), "°"),
+            Box::new(|i| {
+                let at = dataset.rows[i].reading.place_mm();
+                at.x.hypot(at.y).atan2(at.z.abs()).to_degrees()
             }),
         ),
         Cause::Measurement(d) if matches!(d.profile, Profile::Temperature { .. }) => (
@@ -119,6 +132,10 @@ fn across<'d>(cause: &Cause, dataset: &'d Dataset) -> (Label, Box<dyn Fn(usize) 
         }
         _ => (("data row".to_owned(), ""), Box::new(|i| dataset.rows[i].number as f64)),
     }
+}
+
+fn distance_mm(reading: &Reading) -> f64 {
+    reading.place_mm().norm()
 }
 
 /// Unit vector along which the residual of a sensor shift is plotted, in the base.

@@ -79,10 +79,8 @@ impl Cable {
     /// RMS error if so many units of the readings are a millimetre, and fall where `sign` is −1.
     fn error_mm(&self, per_mm: f64, sign: f64) -> f64 {
         // With the cable drawn in furthest at about zero: the zero is fitted, but not from anywhere.
-        let drawn_in = match sign < 0.0 {
-            true => self.lengths.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            false => 0.0,
-        };
+        let longest_mm = || self.lengths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let drawn_in = if sign < 0.0 { longest_mm() } else { 0.0 };
         let read: Vec<f64> = self.lengths.iter().map(|length| (sign * length + drawn_in) / per_mm).collect();
         cable_and_hook(&self.flanges, &read).map_or(f64::INFINITY, |(found, _)| found.rmse_mm)
     }

@@ -72,6 +72,11 @@ fn a_zero_that_jumped_is_told_with_its_rows() {
     assert!((offset.value - 0.8).abs() < 3.0 * offset.sigma.unwrap());
 }
 
+/// The variable against which the first finding's picture shows the residuals.
+fn shown_over(found: &Diagnosed) -> &str {
+    found.pictures[0].as_ref().map_or("", |picture| &picture.x.0)
+}
+
 #[test]
 fn a_second_draw_wire_of_another_scale_is_told_with_its_rows_and_widens_the_arm() {
     let second = [Hidden::Scale { rows: Some([120, 299]), factor: 0.0015 }];
@@ -80,6 +85,7 @@ fn a_second_draw_wire_of_another_scale_is_told_with_its_rows_and_widens_the_arm(
     let finding = &out.diagnosed.diagnosis.findings[0];
     assert_eq!((finding.effect, finding.rows), (CauseKind::SensorScale, Some([120, 299])));
     assert_eq!(finding.confidence, Confidence::Identified);
+    assert_eq!(shown_over(&out.diagnosed), "data row", "the band of its rows is drawn there");
     let error = &finding.parameters[0];
     assert!((error.value - 0.0015).abs() < 3.0 * error.sigma.unwrap(), "{error:?}");
     // Which of the two wires is right, no row tells: the arm is as uncertain in size as they differ.
@@ -101,6 +107,7 @@ fn a_cable_that_reads_longer_paid_out_is_told_from_readings_that_had_not_settled
     expect(&out);
     let finding = &out.diagnosed.diagnosis.findings[0];
     assert_eq!(finding.confidence, Confidence::Identified, "{finding:?}");
+    assert_eq!(shown_over(&out.diagnosed), "change of the reading from the row before");
     let difference = &finding.parameters[0];
     assert!((difference.value - 0.3).abs() < 4.0 * difference.sigma.unwrap(), "{difference:?}");
 }
@@ -111,6 +118,7 @@ fn a_lens_that_distorts_is_told_from_axes_of_other_scales() {
     expect(&out);
     let finding = &out.diagnosed.diagnosis.findings[0];
     assert_eq!(finding.confidence, Confidence::Identified, "{finding:?}");
+    assert_eq!(shown_over(&out.diagnosed), "angle from the axis of the camera");
     assert!((finding.parameters[0].value - 0.02).abs() < 0.002, "{:?}", finding.parameters);
 }
 
