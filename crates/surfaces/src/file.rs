@@ -56,15 +56,18 @@
 //! | `path.speed_mm_s`, `travel_speed_mm_s` | of cuts; of approach, retract and links | required; 100 |
 //! | `path.zone` | `fine`, `z0`, `z1`, `z5`, … between cuts | `z1` |
 
+mod faults;
+mod surface_table;
+
 use std::fmt::Display;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
+use truegrind_math::toml_text::{self, TomlError};
 
-use super::expression::ExpressionError;
-use super::mesh::{Mesh, MeshOptions};
-use crate::domain::Domain;
-use crate::equation::{Explicit, Implicit, Parametric};
+use self::faults::Faults;
+use self::surface_table::SurfaceTable;
 use crate::error::SurfaceError;
 use crate::path::{self, Along, PathOptions, PathPoint, Pattern, Spacing, ToolX, Traverse};
 use crate::surface::Surface;
@@ -78,8 +81,6 @@ pub const ZONES: [&str; 15] = [
 const MIN_DISTANCE_MM: f64 = 2.0;
 /// Largest distance of a frame from its parent (mm).
 const MAX_DISTANCE_MM: f64 = 1e6;
-/// Largest speed [mm/s], mass (kg), radius (mm) or unit (mm).
-const MAX_QUANTITY: f64 = 1e6;
 
 /// Origin of a tool or work-object frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -166,34 +167,34 @@ impl SurfaceFile {
         bytes: &[u8],
         resolve: impl FnOnce(&str) -> Result<Vec<u8>, E>,
     ) -> Result<Self, SurfaceError> {
+        let faults = Faults { file };
         let text = std::str::from_utf8(bytes).map_err(|error| {
             let read = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
-            toml_error(file, &read, read.len(), "found a byte that is not UTF-8, expected text")
+            faults.toml(&read, read.len(), "found a byte that is not UTF-8, expected text")
         })?;
-        let stated: Stated = truegrind_math::toml_text::read(text).map_err(|error| {
-            let at = error.span().map_or(0, |span| span.start);
-            toml_error(file, text, at, error.message())
-        })?;
-        let report = Reporter { file };
+        let toml =
+            |error: TomlError| faults.toml(text, error.span().map_or(0, |span| span.start), error.message());
+        let stated: Stated = toml_text::read(text).map_err(toml)?;
+        let surface_table = SurfaceTable::read(text).map_err(toml)?;
         let name = stated.name.unwrap_or_else(|| "surface".to_owned());
-        report.name("name", &name)?;
-        let surface = report.surface(&stated.surface, resolve)?;
-        let work_object = report.work_object(stated.work_object)?;
-        let tool = report.tool(stated.tool)?;
-        let path = report.path(&stated.path, &stated.surface, &tool)?;
+        faults.name("name", &name)?;
+        let surface = surface_table.surface(&faults, resolve)?;
+        let work_object = faults.work_object(stated.work_object)?;
+        let tool = faults.tool(stated.tool)?;
+        let path = faults.path(&stated.path, surface_table.coordinates(), &tool)?;
         let motion = &stated.path;
-        let speed_mm_s = report.positive(
+        let speed_mm_s = faults.positive(
             "path.speed_mm_s",
             motion.speed_mm_s,
             "a speed above 0 in mm/s, up to 1,000,000",
         )?;
         let travel = motion.travel_speed_mm_s.unwrap_or(100.0);
         let travel_speed_mm_s =
-            report.positive("path.travel_speed_mm_s", travel, "a speed above 0 in mm/s, up to 1,000,000")?;
+            faults.positive("path.travel_speed_mm_s", travel, "a speed above 0 in mm/s, up to 1,000,000")?;
         let zone = motion.zone.clone().unwrap_or_else(|| "z1".to_owned());
         if !ZONES.contains(&zone.as_str()) {
             let expected = format!("one of {}", ZONES.join(", "));
-            return Err(report.value(
+            return Err(faults.value(
                 "path.zone",
                 format!("`{zone}`"),
                 expected,
@@ -216,37 +217,12 @@ impl SurfaceFile {
 #[serde(deny_unknown_fields)]
 struct Stated {
     name: Option<String>,
-    surface: StatedSurface,
+    /// Read by its kind, as a [`SurfaceTable`].
+    #[serde(rename = "surface")]
+    _surface: IgnoredAny,
     work_object: StatedWorkObject,
     tool: StatedTool,
     path: StatedPath,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Kind {
-    Explicit,
-    Parametric,
-    Implicit,
-    Mesh,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StatedSurface {
-    kind: Kind,
-    x: Option<String>,
-    y: Option<String>,
-    z: Option<String>,
-    f: Option<String>,
-    mesh: Option<String>,
-    x_mm: Option<[f64; 2]>,
-    y_mm: Option<[f64; 2]>,
-    z_mm: Option<[f64; 2]>,
-    u: Option<[f64; 2]>,
-    v: Option<[f64; 2]>,
-    unit_mm: Option<f64>,
-    flip_normal: Option<bool>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -299,174 +275,7 @@ struct StatedPath {
     zone: Option<String>,
 }
 
-/// Converts the stated values, and faults into errors that name the file.
-struct Reporter<'a> {
-    file: &'a str,
-}
-
-impl Reporter<'_> {
-    fn value(
-        &self,
-        key: &str,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-        remedy: &str,
-    ) -> SurfaceError {
-        SurfaceError::Value {
-            file: self.file.to_owned(),
-            key: key.to_owned(),
-            found: found.into(),
-            expected: expected.into(),
-            remedy: remedy.to_owned(),
-        }
-    }
-
-    fn stated(&self, key: &str, source: SurfaceError) -> SurfaceError {
-        SurfaceError::Stated { file: self.file.to_owned(), key: key.to_owned(), source: Box::new(source) }
-    }
-
-    fn name(&self, key: &str, name: &str) -> Result<(), SurfaceError> {
-        let fits = name.starts_with(|c: char| c.is_ascii_alphabetic())
-            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-            && name.len() <= 32;
-        if fits {
-            return Ok(());
-        }
-        let expected = "a letter, then letters, digits or _, 32 characters at most";
-        Err(self.value(key, format!("`{name}`"), expected, "choose a name that the controller accepts"))
-    }
-
-    fn positive(&self, key: &str, value: f64, expected: &str) -> Result<f64, SurfaceError> {
-        if (f64::MIN_POSITIVE..=MAX_QUANTITY).contains(&value) {
-            Ok(value)
-        } else {
-            Err(self.value(key, value.to_string(), expected, "correct the number"))
-        }
-    }
-
-    fn surface<E: Display>(
-        &self,
-        stated: &StatedSurface,
-        resolve: impl FnOnce(&str) -> Result<Vec<u8>, E>,
-    ) -> Result<Surface, SurfaceError> {
-        let (kind, wanted, may): (&str, &[&str], &[&str]) = match stated.kind {
-            Kind::Explicit => ("explicit", &["z", "x_mm", "y_mm"], &[]),
-            Kind::Parametric => ("parametric", &["x", "y", "z", "u", "v"], &["flip_normal"]),
-            Kind::Implicit => ("implicit", &["f", "x_mm", "y_mm", "z_mm"], &[]),
-            Kind::Mesh => ("mesh", &["mesh"], &["x_mm", "y_mm", "unit_mm", "flip_normal"]),
-        };
-        let given = [
-            ("x", stated.x.is_some()),
-            ("y", stated.y.is_some()),
-            ("z", stated.z.is_some()),
-            ("f", stated.f.is_some()),
-            ("mesh", stated.mesh.is_some()),
-            ("x_mm", stated.x_mm.is_some()),
-            ("y_mm", stated.y_mm.is_some()),
-            ("z_mm", stated.z_mm.is_some()),
-            ("u", stated.u.is_some()),
-            ("v", stated.v.is_some()),
-            ("unit_mm", stated.unit_mm.is_some()),
-            ("flip_normal", stated.flip_normal.is_some()),
-        ];
-        for (key, is_given) in given {
-            let full = format!("surface.{key}");
-            let list = format!("the keys {} with kind = \"{kind}\"", [wanted, may].concat().join(", "));
-            if is_given && !wanted.contains(&key) && !may.contains(&key) {
-                return Err(self.value(
-                    &full,
-                    "a key without a meaning",
-                    list,
-                    "remove it, or change the kind",
-                ));
-            }
-            if !is_given && wanted.contains(&key) {
-                return Err(self.value(&full, "nothing", list, "state it"));
-            }
-        }
-        let text = |text: &Option<String>| text.clone().unwrap_or_default();
-        let range = |range: Option<[f64; 2]>| range.unwrap_or([f64::NAN; 2]);
-        let flipped = stated.flip_normal.unwrap_or(false);
-        let over_xy = Domain { first: range(stated.x_mm), second: range(stated.y_mm) };
-        let made = match stated.kind {
-            Kind::Explicit => Explicit::new(&text(&stated.z), over_xy).map(Surface::Explicit),
-            Kind::Implicit => {
-                Implicit::new(&text(&stated.f), over_xy, range(stated.z_mm)).map(Surface::Implicit)
-            }
-            Kind::Parametric => {
-                let [x, y, z] = [text(&stated.x), text(&stated.y), text(&stated.z)];
-                let domain = Domain { first: range(stated.u), second: range(stated.v) };
-                Parametric::new([&x, &y, &z], domain, flipped).map(Surface::Parametric)
-            }
-            Kind::Mesh => return self.mesh(stated, &text(&stated.mesh), flipped, resolve),
-        };
-        made.map_err(|error| {
-            let key = match &error {
-                SurfaceError::Expression(ExpressionError { text, .. }) => {
-                    let texts = [("x", &stated.x), ("y", &stated.y), ("z", &stated.z), ("f", &stated.f)];
-                    let holds = |given: &Option<String>| given.as_ref() == Some(text);
-                    texts
-                        .iter()
-                        .find(|(_, given)| holds(given))
-                        .map_or("surface".to_owned(), |(key, _)| format!("surface.{key}"))
-                }
-                SurfaceError::Range { name, .. } if stated.kind == Kind::Parametric => {
-                    format!("surface.{name}")
-                }
-                SurfaceError::Range { name, .. } => format!("surface.{name}_mm"),
-                _ => "surface".to_owned(),
-            };
-            self.stated(&key, error)
-        })
-    }
-
-    fn mesh<E: Display>(
-        &self,
-        stated: &StatedSurface,
-        name: &str,
-        flipped: bool,
-        resolve: impl FnOnce(&str) -> Result<Vec<u8>, E>,
-    ) -> Result<Surface, SurfaceError> {
-        let domain = match (stated.x_mm, stated.y_mm) {
-            (Some(first), Some(second)) => Some(Domain { first, second }),
-            (None, None) => None,
-            (x, _) => {
-                let (given, missing) = if x.is_some() { ("x_mm", "y_mm") } else { ("y_mm", "x_mm") };
-                let key = format!("surface.{missing}");
-                let expected = format!("a range, as {given} is given");
-                return Err(self.value(
-                    &key,
-                    "nothing",
-                    expected,
-                    "state both ranges, or neither for all of the mesh",
-                ));
-            }
-        };
-        let unit_mm = self.positive(
-            "surface.unit_mm",
-            stated.unit_mm.unwrap_or(1.0),
-            "the length of the file's unit in mm, above 0, up to 1,000,000",
-        )?;
-        let bytes = resolve(name).map_err(|error| {
-            let found = format!("`{name}`, which cannot be read ({error})");
-            self.value(
-                "surface.mesh",
-                found,
-                "an STL file beside this file",
-                "correct the name or put the file there",
-            )
-        })?;
-        Mesh::from_stl(&bytes, &MeshOptions { unit_mm, flipped, domain }).map(Surface::Mesh).map_err(
-            |error| {
-                let key = match &error {
-                    SurfaceError::Range { name, .. } => format!("surface.{name}_mm"),
-                    _ => "surface.mesh".to_owned(),
-                };
-                self.stated(&key, error)
-            },
-        )
-    }
-
+impl Faults<'_> {
     fn work_object(&self, stated: StatedWorkObject) -> Result<WorkObject, SurfaceError> {
         self.name("work_object.name", &stated.name)?;
         let frame = self.frame("work_object", stated.position_mm, stated.quaternion, stated.rpy_deg)?;
@@ -551,7 +360,7 @@ impl Reporter<'_> {
     fn path(
         &self,
         stated: &StatedPath,
-        surface: &StatedSurface,
+        coordinates: [&str; 2],
         tool: &Tool,
     ) -> Result<PathOptions, SurfaceError> {
         let only_raster = |key: &str, given: bool| {
@@ -571,7 +380,7 @@ impl Reporter<'_> {
         let default = PathOptions::default();
         let options = PathOptions {
             pattern: stated.pattern,
-            along: self.along(stated, surface)?,
+            along: self.along(stated, coordinates)?,
             traverse: stated.traverse.unwrap_or_default(),
             spacing: self.spacing(stated, tool)?,
             max_step_mm: stated.max_step_mm.unwrap_or(default.max_step_mm),
@@ -591,8 +400,7 @@ impl Reporter<'_> {
     }
 
     /// The coordinate of the surface along which the passes run.
-    fn along(&self, stated: &StatedPath, surface: &StatedSurface) -> Result<Along, SurfaceError> {
-        let names = if surface.kind == Kind::Parametric { ["u", "v"] } else { ["x", "y"] };
+    fn along(&self, stated: &StatedPath, names: [&str; 2]) -> Result<Along, SurfaceError> {
         Ok(match stated.along.as_deref() {
             None => Along::First,
             Some(name) if name == names[0] => Along::First,
@@ -647,17 +455,5 @@ impl Reporter<'_> {
             (Some(StatedToolX::Feed), None) => ToolX::Feed,
             (_, direction) => ToolX::Fixed(Vector3::from(direction.unwrap_or([1.0, 0.0, 0.0]))),
         })
-    }
-}
-
-fn toml_error(file: &str, text: &str, at: usize, message: &str) -> SurfaceError {
-    let before = &text[..text.floor_char_boundary(at)];
-    let line = before.matches('\n').count() + 1;
-    let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
-    SurfaceError::Toml {
-        file: file.to_owned(),
-        line,
-        column,
-        message: message.trim_end().replace('\n', ", "),
     }
 }

@@ -130,14 +130,14 @@ fn what_is_wrong_is_named_with_file_and_key() {
         (blade(Z, "z = \"x + w\""), &["`surface.z`", "unknown name `w`", "variables x, y"]),
         (blade(Z, "z = \"ln(x)\""), &["`surface`", "not finite", "x = -50", "shrink the domain"]),
         (blade(Z, "z = 3"), &["line 8", "column 5", "expected a string"]),
-        (blade(Z, ""), &["`surface.z`", "found nothing"]),
-        (blade(Z, &format!("{Z}\nu = [0, 1]")), &["`surface.u`", "without a meaning", "kind = \"explicit\""]),
+        (blade(Z, ""), &["line 5", "missing field `z`"]),
+        (blade(Z, &format!("{Z}\nu = [0, 1]")), &["line 9", "unknown field `u`", "`x_mm`"]),
         (blade(Z, &format!("{Z}\ncolour = 3")), &["line 9", "column 1", "unknown field `colour`"]),
         (
             blade("kind = \"explicit\"", "kind = \"exotic\""),
             &["line 6", "unknown variant `exotic`", "`explicit`"],
         ),
-        (blade("kind = \"explicit\"", "kind = \"mesh\""), &["`surface.z`", "without a meaning"]),
+        (blade("kind = \"explicit\"", "kind = \"mesh\""), &["line 8", "unknown field `z`", "`mesh`"]),
         (
             blade("x_mm = [-50, 50]", "x_mm = [50, -50]"),
             &["`surface.x_mm`", "50 to -50", "the smaller first"],
