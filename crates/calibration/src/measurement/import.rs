@@ -1,9 +1,9 @@
 //! Reads measurement files to a [`Dataset`]; errors name the location in the file.
 //!
-//! HeaderColumns are found by header name, in any order: `q1…q6` logged joint angles (deg); one sensor, `L` (mm) or
+//! Columns are found by header name, in any order: `q1…q6` logged joint angles (deg); one sensor, `L` (mm) or
 //! `measured_x, measured_y, measured_z` (mm) (with `measured_qw … measured_qz` a full pose); optional `x, y, z` (mm),
 //! `t` (h), `session`, `temperature` [°C], `payload` (kg), `approach1…6`, `anchor` or `station`, and `path, cycle, sample` of rows that were read
-//! on a path. Other columns are kept as text.
+//! on a path. A header may state the unit behind the name (`q1 [deg]`, `L (mm)`, `q1_deg`). Other columns are kept as text.
 //! Tables of RoboDK and DELMIA are recognised by their content (see the notes of the dataset).
 //! CSV fields are separated by comma, semicolon or tab; with semicolon or tab, decimal commas are accepted. Of a workbook,
 //! the named sheet is read, or else the first with the required columns.
@@ -23,6 +23,7 @@ mod tracker_export;
 mod foreign;
 mod rows;
 mod rounding;
+mod stated_unit;
 
 pub use error::{ImportError, Location};
 pub use options::{Options, TimeMatching};

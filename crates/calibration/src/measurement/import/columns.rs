@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::cell::{Line, Table};
 use super::column_names::{PATH, POSITION, QUATERNION, READOUT};
 use super::error::{ImportError, Location};
+use super::stated_unit::{WithUnit, with_unit};
 use crate::measurement::dataset::Sensor;
 use truegrind_math::sentence::listed;
 
@@ -19,7 +20,7 @@ pub(super) struct HeaderColumns {
     pub(super) joints: [usize; 6],
     /// The sensor.
     pub(super) sensor: Sensor,
-    /// HeaderColumns of the sensor: L, or x y z, or x y z qw qx qy qz.
+    /// Columns of the sensor: L, or x y z, or x y z qw qx qy qz.
     pub(super) reading: Vec<usize>,
     /// x, y, z of the controller.
     pub(super) readout: Option<[usize; 3]>,
@@ -37,7 +38,7 @@ pub(super) struct HeaderColumns {
     pub(super) station: Option<usize>,
     /// path, cycle, sample, where all three are there.
     pub(super) path: Option<[usize; 3]>,
-    /// HeaderColumns that are kept but not used.
+    /// Columns that are kept but not used.
     pub(super) other: Vec<(String, usize)>,
     /// Notes for the user.
     pub(super) notes: Vec<String>,
@@ -52,13 +53,10 @@ impl HeaderColumns {
         };
         let line = &table.rows[header];
         location.row = Some(line.number);
-        let named: Vec<(String, usize)> = line
-            .cells
-            .iter()
-            .enumerate()
-            .filter(|(_, cell)| !cell.is_empty())
-            .map(|(i, cell)| (cell.to_string(), i))
-            .collect();
+        let cells = line.cells.iter().enumerate().filter(|(_, cell)| !cell.is_empty());
+        let named = cells
+            .map(|(i, cell)| Ok((without_unit(cell.to_string(), &location)?, i)))
+            .collect::<Result<Vec<(String, usize)>, ImportError>>()?;
         let found: Vec<String> = named.iter().map(|(n, _)| n.clone()).collect();
         let letter = joint_letter(&found);
         let is_known = |name: &str| is_known(name) || joint_number(name, letter).is_some();
@@ -138,6 +136,21 @@ impl HeaderColumns {
     }
 }
 
+/// A header without its unit. In another unit than the expected one a required column is an error, and an optional one keeps
+/// its header, so that it is not used.
+fn without_unit(header: String, location: &Location) -> Result<String, ImportError> {
+    match with_unit(&header, |name| joint(name).is_some()) {
+        None | Some(WithUnit { is_expected: false, is_required: false, .. }) => Ok(header),
+        Some(WithUnit { name, is_expected: true, .. }) => Ok(name.to_owned()),
+        Some(WithUnit { name, unit, expected, .. }) => Err(ImportError::Unusable {
+            location: Location { column: Some(name.into()), ..location.clone() },
+            message: format!(
+                "the header states `{unit}`; expected {expected}: convert the numbers and the header"
+            ),
+        }),
+    }
+}
+
 /// The columns of a path. Other programs use these names too, so they count only when all three are present.
 fn path_columns(
     named: &[(String, usize)],
@@ -212,7 +225,12 @@ pub(super) fn has_joints(table: &Table) -> bool {
 }
 
 fn names_a_joint(line: &Line) -> bool {
-    line.cells.iter().any(|cell| joint(&cell.to_string()).is_some())
+    line.cells.iter().any(|cell| {
+        let header = cell.to_string();
+        let name =
+            with_unit(&header, |name| joint(name).is_some()).map_or(header.as_str(), |stated| stated.name);
+        joint(name).is_some()
+    })
 }
 
 fn sensor_columns(

@@ -34,6 +34,36 @@ fn the_stations_of_a_cable_are_sessions() {
 }
 
 #[test]
+fn a_header_may_state_its_unit() {
+    let plain = read(&format!("{HEADER},t\n10,20,30,40,50,60,500.5,0.5\n")).unwrap();
+    for header in [
+        "q1 [deg],q2 (deg),q3[°],q4_deg,q5 [Degrees],q6 ( deg ),L [mm],t (h)",
+        "J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg],L_mm,t [hours]",
+    ] {
+        let stated = read(&format!("{header}\n10,20,30,40,50,60,500.5,0.5\n")).unwrap();
+        assert_eq!(stated.rows, plain.rows, "{header}");
+        assert!(stated.other_columns.is_empty() && stated.notes.is_empty(), "{header}: {:?}", stated.notes);
+    }
+    // Another unit is named where the column is needed, and its column is not used where it is not.
+    for (header, column, said) in [
+        ("q1,q2 [rad],q3,q4,q5,q6,L", "q2", "states `rad`; expected deg"),
+        ("q1,q2,q3,q4,q5,q6_rad,L", "q6", "states `rad`; expected deg"),
+        ("q1,q2,q3,q4,q5,q6,L (m)", "L", "states `m`; expected mm"),
+        ("q1,q2,q3,q4,q5,q6,L [in]", "L", "states `in`; expected mm"),
+    ] {
+        let message = complaint(&format!("{header}\n10,20,30,40,50,60,500.5\n"));
+        assert!(message.starts_with(&format!("rows.csv, row 1, column {column}: ")), "{message}");
+        assert!(message.contains(said), "{message}");
+    }
+    let seconds = read(&format!("{HEADER},t [s]\n10,20,30,40,50,60,500.5,1800\n")).unwrap();
+    assert_eq!(
+        (seconds.rows[0].condition.time_h, seconds.other_columns.as_slice()),
+        (None, &["t [s]".to_owned()][..])
+    );
+    assert!(seconds.notes.iter().any(|note| note.contains("`t [s]`")), "{:?}", seconds.notes);
+}
+
+#[test]
 fn columns_in_any_order_with_others_between() {
     let data = read(
         "\u{feff}L,operator,q6,q5,q4,q3,q2,q1,t,session,approach2\n\
