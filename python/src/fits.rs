@@ -151,29 +151,7 @@ pub(crate) fn identify_(
     if !(held_out > 0.0 && held_out <= 0.9) {
         return Err(Refusal::argument("held_out", held_out, "a share above 0, up to 0.9").into());
     }
-    let mut tolerance = Tolerance::default();
-    for (name, stated, place, scale) in [
-        ("tolerance_length_mm", tolerance_length_mm, &mut tolerance.length_mm, 1.0),
-        ("tolerance_angle_deg", tolerance_angle_deg, &mut tolerance.angle_rad, 1.0_f64.to_radians()),
-    ] {
-        if let Some(value) = stated {
-            *place = positive(name, value)? * scale;
-        }
-    }
-    // As in the command line, stated tolerances are not estimated from the data.
-    tolerance.zero_rad = tolerance.angle_rad;
-    tolerance.learn_widths = tolerance_length_mm.is_none() && tolerance_angle_deg.is_none();
-    if let Some(percent) = sensor_scale_sigma_percent {
-        if !(0.0..=10.0).contains(&percent) {
-            return Err(Refusal::argument(
-                "sensor_scale_sigma_percent",
-                percent,
-                "a percentage from 0 to 10",
-            )
-            .into());
-        }
-        tolerance.scale = Some(percent / 100.0);
-    }
+    let tolerance = tolerance(tolerance_length_mm, tolerance_angle_deg, sensor_scale_sigma_percent)?;
     for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
         limit.map(|limit| positive(name, limit)).transpose()?;
     }
@@ -197,6 +175,34 @@ pub(crate) fn identify_(
         let found = identify(&rows, name, nominal, &frames, &share, &options)?;
         Ok(PyIdentification { found: Arc::new(found), rows: Arc::new(rows) })
     })
+}
+
+/// The tolerances of the arm and the sensor's scale. As in the command line, stated tolerances are not estimated from the data.
+///
+/// # Errors
+/// Names the argument.
+fn tolerance(
+    length_mm: Option<f64>,
+    angle_deg: Option<f64>,
+    scale_percent: Option<f64>,
+) -> Result<Tolerance, Refusal> {
+    let mut tolerance =
+        Tolerance { learn_widths: length_mm.is_none() && angle_deg.is_none(), ..Tolerance::default() };
+    if let Some(length) = length_mm {
+        tolerance.length_mm = positive("tolerance_length_mm", length)?;
+    }
+    if let Some(angle) = angle_deg {
+        tolerance.angle_rad = positive("tolerance_angle_deg", angle)?.to_radians();
+    }
+    tolerance.zero_rad = tolerance.angle_rad;
+    if let Some(percent) = scale_percent {
+        if !(0.0..=10.0).contains(&percent) {
+            let expected = "a percentage from 0 to 10";
+            return Err(Refusal::argument("sensor_scale_sigma_percent", percent, expected));
+        }
+        tolerance.scale = Some(percent / 100.0);
+    }
+    Ok(tolerance)
 }
 
 /// A number above 0.
@@ -317,14 +323,17 @@ impl PyDiagnosis {
 }
 
 /// Finds the causes of errors that geometry does not explain. ``alpha``: probability of any false finding. ``most``: largest number of
-/// causes. ``blocks``: number of contiguous blocks held out in turn. ``also``: further datasets of the same arm, on which the models are
-/// tested with only the frames refitted.
+/// causes. ``blocks``: number of contiguous blocks held out in turn. Tolerances (mm, °): prior σ of the links.
+/// ``sensor_scale_sigma_percent``: standard uncertainty of the sensor's scale (%), such as 0.001 for a tracker that agreed with a scale
+/// bar; by default a fault of the scale is considered possible. ``also``: further datasets of the same arm, on which the models are tested
+/// with only the frames refitted.
 #[pyfunction]
 #[pyo3(
     name = "diagnose",
     signature = (
         dataset, robot, *, alpha = 0.01, most = 20, blocks = 10, smooth = false, fuse_readout = true, limit_rmse_mm = None,
-        limit_max_mm = None, seed = 0, also = Vec::new(), angles: "Literal['logged', 'dh'] | None" = None, threads = None, progress = None
+        limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, sensor_scale_sigma_percent = None, seed = 0,
+        also = Vec::new(), angles: "Literal['logged', 'dh'] | None" = None, threads = None, progress = None
     )
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
@@ -339,6 +348,9 @@ pub(crate) fn diagnose_(
     fuse_readout: bool,
     limit_rmse_mm: Option<f64>,
     limit_max_mm: Option<f64>,
+    tolerance_length_mm: Option<f64>,
+    tolerance_angle_deg: Option<f64>,
+    sensor_scale_sigma_percent: Option<f64>,
     seed: i64,
     also: Vec<PyRef<'_, PyDataset>>,
     angles: Option<&str>,
@@ -359,7 +371,9 @@ pub(crate) fn diagnose_(
         }
     }
     let limits = Limits { rmse_mm: limit_rmse_mm, max_mm: limit_max_mm };
-    let mut options = DiagnoseOptions { blocks, smooth, fuse_readout, limits, ..DiagnoseOptions::default() };
+    let arm_tolerance = tolerance(tolerance_length_mm, tolerance_angle_deg, sensor_scale_sigma_percent)?;
+    let mut options =
+        DiagnoseOptions { blocks, smooth, fuse_readout, limits, arm_tolerance, ..DiagnoseOptions::default() };
     options.selection.alpha = alpha;
     options.selection.most = whole("most", most)?;
     options.selection.seed = whole("seed", seed)?;

@@ -33,6 +33,19 @@ def test_diagnose_gives_the_bytes_of_the_binary(run, tmp_path):
     assert found.to_html() == page.read_text(encoding="utf-8")
 
 
+def test_what_is_known_of_scale_and_tolerances_reaches_the_diagnosis(run):
+    known = ("--sensor-scale-sigma", "0.001", "--tolerance-length", "0.4", "--tolerance-angle", "0.2")
+    printed = run("diagnose", DATA / "irb120-tracker.csv", "--robot", "abb-irb-120", "--json", *known)
+    rows = tg.Dataset.from_csv(DATA / "irb120-tracker.csv")
+    options = {"sensor_scale_sigma_percent": 0.001, "tolerance_length_mm": 0.4, "tolerance_angle_deg": 0.2}
+    assert tg.diagnose(rows, "abb-irb-120", **options).to_json().encode() == printed
+    assert tg.diagnose(rows, "abb-irb-120").to_json().encode() != printed
+    with pytest.raises(tg.ArgumentError, match="a percentage from 0 to 10"):
+        tg.diagnose(rows, "abb-irb-120", sensor_scale_sigma_percent=11)
+    with pytest.raises(tg.ArgumentError, match="tolerance_length_mm"):
+        tg.diagnose(rows, "abb-irb-120", tolerance_length_mm=0)
+
+
 @pytest.mark.parametrize("program", ["told.mod", "circles.mod"])
 def test_compensate_and_deviation_give_the_bytes_of_the_binary(run, tmp_path, model, program):
     arm, written, source = tmp_path / "arm.toml", tmp_path / program, PROGRAMS / program

@@ -572,11 +572,13 @@ def deviation(program: str | PathLike[str] | Sequence[str | PathLike[str]] | Map
     ``Arm`` of a simulation) the programs are run on that arm.
     """
 
-def diagnose(dataset: Dataset, robot: Robot | str | PathLike[str], *, alpha: SupportsFloat | SupportsIndex = 0.01, most: SupportsIndex = 20, blocks: SupportsIndex = 10, smooth: bool = False, fuse_readout: bool = True, limit_rmse_mm: SupportsFloat | SupportsIndex | None = None, limit_max_mm: SupportsFloat | SupportsIndex | None = None, seed: SupportsIndex = 0, also: SupportsGetItem[int, Dataset] = ..., angles: "Literal['logged', 'dh'] | None" = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Diagnosis:
+def diagnose(dataset: Dataset, robot: Robot | str | PathLike[str], *, alpha: SupportsFloat | SupportsIndex = 0.01, most: SupportsIndex = 20, blocks: SupportsIndex = 10, smooth: bool = False, fuse_readout: bool = True, limit_rmse_mm: SupportsFloat | SupportsIndex | None = None, limit_max_mm: SupportsFloat | SupportsIndex | None = None, tolerance_length_mm: SupportsFloat | SupportsIndex | None = None, tolerance_angle_deg: SupportsFloat | SupportsIndex | None = None, sensor_scale_sigma_percent: SupportsFloat | SupportsIndex | None = None, seed: SupportsIndex = 0, also: SupportsGetItem[int, Dataset] = ..., angles: "Literal['logged', 'dh'] | None" = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Diagnosis:
     """
     Finds the causes of errors that geometry does not explain. ``alpha``: probability of any false finding. ``most``: largest number of
-    causes. ``blocks``: number of contiguous blocks held out in turn. ``also``: further datasets of the same arm, on which the models are
-    tested with only the frames refitted.
+    causes. ``blocks``: number of contiguous blocks held out in turn. Tolerances (mm, °): prior σ of the links.
+    ``sensor_scale_sigma_percent``: standard uncertainty of the sensor's scale (%), such as 0.001 for a tracker that agreed with a scale
+    bar; by default a fault of the scale is considered possible. ``also``: further datasets of the same arm, on which the models are tested
+    with only the frames refitted.
     """
 
 def forward(arm: Robot | Model | Arm, q_deg: ArrayLike, *, payload_kg: SupportsFloat | SupportsIndex | None = None, payload_centre_mm: SupportsLenAndGetItem[SupportsFloat | SupportsIndex] | None = None, temperature_c: SupportsFloat | SupportsIndex | None = None, time_h: SupportsFloat | SupportsIndex | None = None) -> Poses:
