@@ -132,7 +132,8 @@ pub fn compensate_prepared(
 
 /// Air moves of an NC program next to a cut that stays uncorrected: before it and after the last cut of the file, since correcting them would
 /// move its start, and the values of the axes that its blocks omit; and the first one after it, which would draw the tool out of the part
-/// sideways.
+/// sideways. For the same reason the one that draws the tool out of a corrected cut is corrected, if another leads to the next cut: the values
+/// of the axes that this other omits are then written out in it.
 fn air_moves_alone(listing: &Listing, planned: &Plan) -> Vec<(u32, OutcomeReason)> {
     if !listing.numbered {
         return Vec::new();
@@ -152,7 +153,10 @@ fn air_moves_alone(listing: &Listing, planned: &Plan) -> Vec<(u32, OutcomeReason
             if is_cut(at) {
                 cut = at;
             } else if is_corrected[at] && !is_corrected[cut] {
-                out.push((at as u32, OutcomeReason::AirMoveAlone));
+                let departs = at > here.start && is_cut(at - 1) && is_corrected[at - 1] && at + 1 < cut;
+                if !departs {
+                    out.push((at as u32, OutcomeReason::AirMoveAlone));
+                }
             } else if is_corrected[at]
                 && at > here.start
                 && is_cut(at - 1)

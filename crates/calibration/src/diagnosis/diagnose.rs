@@ -156,22 +156,27 @@ pub fn diagnose(
     })
 }
 
-/// States whether the written arm has the `effects` of a finding, and what to do where it has not: an effect of size 0 corrects nothing.
+/// States whether the written arm has the `effects` of a finding, and what to do where it has not: an effect of size 0 corrects nothing. A
+/// finding bears the name of its first effect; of further terms those that are not certain may be missing.
 fn say_whether_corrected<'a>(
     finding: &mut Finding,
-    mut effects: impl Iterator<Item = &'a Effect> + Clone,
+    mut effects: impl Iterator<Item = &'a Effect>,
     estimated: &Estimated,
 ) {
-    if finding.effect == CauseKind::SmallDisturbances || effects.clone().next().is_none() {
+    if finding.effect == CauseKind::SmallDisturbances {
         return;
     }
     let is_written = |effect: &Effect| {
         estimated.model.effects.iter().any(|other| is_same_effect(effect, other) && !other.is_zero())
     };
-    let corrected = effects.all(is_written);
+    let Some(corrected) = effects.next().map(is_written) else { return };
     finding.corrected = Some(corrected);
     if !corrected {
         finding.remedy = words::remedy_left_out(finding.effect, finding.confidence == Confidence::Ambiguous);
+    } else if !effects.all(is_written) {
+        finding
+            .remedy
+            .push_str("; the written model lacks a further term of this cause, which is not certain");
     }
 }
 

@@ -173,7 +173,7 @@ impl Handover<'_> {
     fn as_identified(&self, written: &Extended) -> Option<Extended> {
         let Fitted { parameters, priors, estimate, model, frames, problem, .. } = self
             .identified
-            .get_or_init(|| as_identify(self.search.context, self.robot, fit_geometry))
+            .get_or_init(|| Some(as_identify(self.search.context, self.robot, fit_geometry)?.fitted))
             .as_ref()?;
         let place = |p| parameters.iter().position(|q| q == p);
         let places = written.parameters.iter().map(place).collect::<Option<Vec<usize>>>()?;

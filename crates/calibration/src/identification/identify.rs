@@ -294,6 +294,16 @@ pub fn identify(
     })
 }
 
+/// A fit of geometry with the rows that it was fitted to. Those that it rejects as outliers are not among them, so that its weights belong
+/// to these rows and to no others.
+#[derive(Debug, Clone)]
+pub struct FittedGeometry {
+    /// The fit.
+    pub fitted: Fitted,
+    /// Its rows.
+    pub rows: Dataset,
+}
+
 /// The fit of geometry to all rows that [`identify`] writes, without what states its error: no row is held out, and its covariance holds nothing of
 /// the sensor's scale.
 ///
@@ -308,7 +318,7 @@ pub(crate) fn fit_geometry(
     frames: &Frames,
     split: &dyn Fn(&Dataset) -> Split,
     options: &Options,
-) -> Result<Fitted, IdentifyError> {
+) -> Result<FittedGeometry, IdentifyError> {
     let (observed, ..) = observations_without_outliers(dataset, nominal, frames, options)?;
     let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
@@ -319,7 +329,8 @@ pub(crate) fn fit_geometry(
     stages.registered_own(&training).map_err(|found| found.error(dataset, robot, nominal))?;
     report_step("fitting all rows");
     let registered = stages.registered(&observed);
-    Ok(stages.geometry(&observed, &registered))
+    let fitted = stages.geometry(&observed, &registered);
+    Ok(FittedGeometry { fitted, rows: observed.dataset })
 }
 
 /// The rows as they are fitted, without outliers, which are the same for every method.

@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector, Point3, UnitQuaternion, Vector3, Vector6};
 
 use super::calibration::Frames;
 use super::fit::{Fitted, Observations, errors_on};
-use super::identify::{Options, fit_geometry};
+use super::identify::{FittedGeometry, Options, fit_geometry};
 use super::linearised_readings::widen_by_scale;
 use super::rounding::logged_covariance;
 use super::sensor_laws::mean_reading;
@@ -136,8 +136,9 @@ pub fn target_contradiction_by_fit(
     let stated = with_touched_point(dataset, nominal, touched, found.clone());
     let with = fitted_beside(&stated, Tolerance { target_mm: sigma_mm, ..*of_arm }, (dataset, nominal));
     if of_arm.scale.is_none() {
-        widen_by_scale(&mut free, dataset, MAX_SCALE_ERROR);
+        free.widen_by_scale(MAX_SCALE_ERROR);
     }
+    let free = free.fitted;
     let own: Vec<usize> = (0..free.parameters.len())
         .filter(|&k| matches!(free.parameters[k], Parameter::Target(0..3)))
         .collect();
@@ -151,7 +152,7 @@ pub fn target_contradiction_by_fit(
     let square = difference.dot(&weighted);
     let off_mm = (of_stated * weighted).norm();
     let is_off = square > CONTRADICTS && off_mm > OF_FIT * typical_error_mm(&free, dataset);
-    let leaves_more = with.is_none_or(|with| with.sigma_mm > OF_FIT * free.sigma_mm.max(ANY_NOISE_MM));
+    let leaves_more = with.is_none_or(|with| with.fitted.sigma_mm > OF_FIT * free.sigma_mm.max(ANY_NOISE_MM));
     (is_off || leaves_more).then(|| {
         format!(
             "--touched-point: with the arm's geometry fitted the readings put the target {:.1} mm from there, at {:.1},{:.1},{:.1} on the flange, \
@@ -171,14 +172,21 @@ fn fitted_beside(
     frames: &Frames,
     tolerance: Tolerance,
     (dataset, nominal): (&Dataset, &Model),
-) -> Option<Fitted> {
+) -> Option<FittedGeometry> {
     let options = Options { tolerance, ..Options::default() };
     let split = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
     let mut geometry = fit_geometry(dataset, "", nominal, frames, &split, &options).ok()?;
     if let Some(sigma) = tolerance.scale {
-        widen_by_scale(&mut geometry, dataset, sigma);
+        geometry.widen_by_scale(sigma);
     }
     Some(geometry)
+}
+
+impl FittedGeometry {
+    /// Adds the uncertainty of the sensor's scale to the covariance.
+    fn widen_by_scale(&mut self, sigma: f64) {
+        widen_by_scale(&mut self.fitted, &self.rows, sigma);
+    }
 }
 
 /// What speaks against the stated frame, whose standard deviation is `sigma_mm`, beside the frame `found` from the readings of the arm
@@ -230,15 +238,16 @@ const MAX_SCALE_ERROR: f64 = 1e-2;
 /// with free frames to readings whose scale is right to `scale`; `None` if nothing does.
 pub fn contradiction_beside_geometry(
     dataset: &Dataset,
-    mut geometry: Fitted,
+    mut geometry: FittedGeometry,
     stated: &Frames,
     sigma: [f64; 2],
     scale: Option<f64>,
 ) -> Option<String> {
     if scale.is_none() {
         // What is stated is in the covariance.
-        widen_by_scale(&mut geometry, dataset, MAX_SCALE_ERROR);
+        geometry.widen_by_scale(MAX_SCALE_ERROR);
     }
+    let geometry = geometry.fitted;
     let own: Vec<usize> =
         (0..geometry.parameters.len()).filter(|&k| is_of_frame(&geometry.parameters[k])).collect();
     let covariance = geometry.estimate.covariance.as_ref()?;
@@ -287,13 +296,14 @@ pub fn judged_by_fit(
     (stated, found): (&Frames, &Frames),
     sigma: [f64; 2],
     (dataset, nominal): (&Dataset, &Model),
-) -> (Option<Option<String>>, Option<Fitted>) {
+) -> (Option<Option<String>>, Option<FittedGeometry>) {
     let of_arm = Tolerance { target_mm: tolerance.target_mm, ..*of_arm };
     let of_arm = tolerance_beside(dataset, nominal, &of_arm);
     let fit = |frames: &Frames, tolerance: Tolerance| fitted_beside(frames, tolerance, (dataset, nominal));
     let Some(free) = fit(found, of_arm) else { return (None, None) };
     let with = fit(stated, Tolerance { frame_mm: sigma[0], frame_rad: sigma[1], ..of_arm });
-    (Some(contradiction_by_fit(dataset, &free, with.as_ref())), Some(free))
+    let with = with.as_ref().map(|with| &with.fitted);
+    (Some(contradiction_by_fit(dataset, &free.fitted, with)), Some(free))
 }
 
 /// What speaks against a stated frame, or a cable's outlet and zero, by what geometry leaves `with` it beside what it leaves `free` of it;

@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
+use crate::frames::undeclared::uses_frames;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Frame, Listing, Motion, Reason};
 use truegrind_programs::nc::dialect::Dialect;
@@ -54,7 +55,7 @@ pub fn cell_template(programs: &[TemplateProgram<'_>], robot: Option<&str>) -> C
     let mut found: BTreeMap<Key, Named> = BTreeMap::new();
     let mut axes = [false; 6];
     for program in programs {
-        for motion in &program.listing.motions {
+        for motion in program.listing.motions.iter().filter(|motion| uses_frames(motion)) {
             note(program, motion, &mut found);
         }
         moved_axes(program.listing, &mut axes);

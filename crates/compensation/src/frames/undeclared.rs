@@ -26,7 +26,7 @@ pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
     if !tools && !objects.any(|object| nowhere(object.value.as_ref().err(), object.place)) {
         return Vec::new();
     }
-    for motion in &listing.motions {
+    for motion in listing.motions.iter().filter(|motion| uses_frames(motion)) {
         for (tool, name) in names(listing, motion) {
             let line = motion.place.line;
             let new = || Undeclared { tool, name: name.to_owned(), motions: 0, line };
@@ -36,6 +36,11 @@ pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
     let mut found: Vec<Undeclared> = found.into_values().collect();
     found.sort_by_key(|one| (one.line, !one.tool));
     found
+}
+
+/// Whether a motion needs its tool and work object: in machine coordinates neither has a part in it, so nobody is to state them for it.
+pub(crate) fn uses_frames(motion: &Motion) -> bool {
+    motion.own_reason != Some(Reason::MachineCoordinates)
 }
 
 /// Undeclared frames of a motion, and whether each is a tool.

@@ -168,7 +168,12 @@ impl Compared<'_> {
         let lasts = |listing: &Listing, motion: usize| listing.durations_s.get(&(motion as u32)).copied();
         if !is_same || lasts(original, index) != lasts(rewritten, partner) {
             let [has, had] = [has, had].map(|speed| speed.map_or("none", |speed| &speed.text));
-            found.push(partner, format!("speed {has} here, {had} in the original (with \\V and \\T)"));
+            let what = match (has == had, rewritten.numbered) {
+                (false, _) => format!("speed {has} here, {had} in the original"),
+                (true, false) => format!("speed {has} with another \\V or \\T than in the original"),
+                (true, true) => format!("speed {has} is not that of the original"),
+            };
+            found.push(partner, what);
         }
         let settings = |motion: &Motion| Modal { displacement: Switch::Off, ..motion.modal };
         if settings(was) != settings(is) {

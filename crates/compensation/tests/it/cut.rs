@@ -540,6 +540,33 @@ fn a_cut_whose_rest_is_reached_by_jumps_or_calls_stays_whole() {
     }
 }
 
+/// The tool leaves a corrected cut along its own lift, even if the next cut stays: what leads there writes out the axes that it omits.
+#[test]
+fn a_corrected_cut_is_left_along_its_lift_whatever_comes_next() {
+    let head = "O1\n(truegrind angles wpr)\n(truegrind tool T1 t [[0,0,50],[1,0,0,0]])\n(truegrind frame G54 w [[400,0,250],[1,0,0,0]])\n\
+                G90 G21 G17 G54\nT1 M6\nG43.4 H1\nG0 X-20. Y0. Z40. A180. B0. C0.\nG1 Z20. F600.\nX-10.\nG0 Z60.\n";
+    let tail = "G1 Z20.\nX#500\nG0 Z60.\nM30\n";
+    let lifted = |approach: &str| {
+        let source = [head, approach, tail].concat();
+        let setup = Setup { angles: Some(Angles::Wpr), ..Setup::default() };
+        let program = Program::Nc(nc::Task::read(&[("p.nc", source.as_bytes())], &setup));
+        let done = compensate(&program, &known(), &Cell::default(), &Options::default(), None).unwrap();
+        let bytes = done.rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+        (statuses(&done), String::from_utf8(bytes).unwrap())
+    };
+    for approach in ["G0 X5. Y10. Z60. A180. B0. C0.\n", "G0 X5.\n", "G0 X5. Y10.\nG0 Z40.\n"] {
+        let (found, text) = lifted(approach);
+        assert_eq!(found[..4], [Changed; 4], "{approach}{text}");
+        assert!(found[4..].iter().all(|status| *status != Changed), "{found:?}");
+        let line = text.lines().find(|line| line.starts_with("G0 X5.")).unwrap();
+        for word in ["X5.", "Z60.", "A180.", "B0.", "C0."] {
+            assert!(line.contains(word), "{line}");
+        }
+    }
+    // Nothing in between: the lift leads to the cut that stays.
+    assert_ne!(lifted("").0[3], Changed);
+}
+
 /// Blocks with a G1 of their own before, in and behind a subprogram are one cut, from whichever side one of them cannot be corrected.
 #[test]
 fn a_cut_that_goes_on_in_a_subprogram_stays_whole() {

@@ -443,6 +443,23 @@ fn a_declared_work_object_without_a_known_value_is_not_called_undeclared() {
     assert_eq!(names, ["elsewhere", "nowhere"]);
 }
 
+/// A motion in machine coordinates needs no tool and no work offset: posts cancel the tool before they retract.
+#[test]
+fn a_motion_in_machine_coordinates_asks_for_no_frame() {
+    let asked = |body: &str| {
+        let source = format!("; truegrind angles wpr\nN10 G90 G71 G17 G54\nN20 T1 D1 M6\n{body}\nN90 M30\n");
+        let setup = truegrind_programs::nc::setup::Setup::default();
+        let task = truegrind_programs::nc::Task::read(&[("p.mpf", source.as_bytes())], &setup);
+        let found = truegrind_compensation::frames::undeclared::undeclared(&task.listing);
+        found.into_iter().map(|one| one.name).collect::<Vec<_>>()
+    };
+    assert_eq!(asked("N30 G0 SUPA Z0 D0"), [""; 0]);
+    assert_eq!(
+        asked("N30 TRAORI\nN40 G0 X0 Y0 Z20 A180 B0 C0\nN50 TRAFOOF\nN60 G0 SUPA Z0 D0"),
+        ["T1", "G54"]
+    );
+}
+
 #[test]
 fn calls_of_routines_in_no_file_are_noted_with_what_is_assumed_of_them() {
     let target = "[[400,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";

@@ -113,6 +113,11 @@ pub fn retries(name: &[u8]) -> bool {
     name.eq_ignore_ascii_case(b"StartMoveRetry")
 }
 
+/// Whether it puts the current path aside or brings it back: unless something moves in between, the robot stays where it is on it.
+pub fn keeps_path(name: &[u8]) -> bool {
+    [&b"StorePath"[..], b"RestoPath"].iter().any(|known| name.eq_ignore_ascii_case(known))
+}
+
 /// Whether it waits for another task, an operator or a device: shared data may change meanwhile.
 pub fn waits(name: &[u8]) -> bool {
     listed(name).is_some_and(|found| found.waits)

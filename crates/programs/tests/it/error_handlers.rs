@@ -104,6 +104,10 @@ fn where_a_handler_or_a_trap_routine_moves_no_start_is_known() {
     assert_eq!(run("TRYNEXT;\n", "")[..2], [false, true]);
     assert_eq!(run(&format!("{GO}TRYNEXT;\n"), "")[..2], [false, false]);
     assert_eq!(run(&format!("{GO}RETURN;\n"), "")[..2], [false, true]);
+    // The path that is put aside and brought back is where the robot stands; one that is cleared is not.
+    assert_eq!(run("StorePath;\nRestoPath;\nStartMoveRetry;\n", "")[..2], [false, true]);
+    assert_eq!(run(&format!("StorePath;\n{GO}RestoPath;\nStartMoveRetry;\n"), "")[..2], [false, false]);
+    assert_eq!(run("StopMove;\nClearPath;\nStartMove;\nRETRY;\n", "")[..2], [false, false]);
     let follows = |trap: &str| {
         let source = module(&format!("PROC main()\n{GO}{far}ENDPROC\nTRAP tr\n{trap}ENDTRAP"));
         let task = Task::read(&[("m.mod", source.as_bytes())]);

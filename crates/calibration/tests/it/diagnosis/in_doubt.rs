@@ -11,6 +11,7 @@ use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::Parameter;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::cause::Cause;
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::Confidence;
 use truegrind_calibration::identification::start::candidate_frames;
@@ -168,4 +169,69 @@ fn what_no_file_carries_and_no_rival_explains_is_as_uncertain_as_it_is_large() {
     assert!(found.estimated.model.effects.iter().all(Effect::is_zero), "it moves no program");
     let z = errors_in_sigma(&found.estimated, &arm, turned);
     assert!((0.5..1.5).contains(&z), "{z}");
+}
+
+/// A compliance with a further term, of which only the further one is uncertain: the written arm has the compliance, and says so.
+#[test]
+fn a_finding_is_corrected_if_the_effect_that_it_is_named_after_is() {
+    let recipe = r#"
+robot = "abb-irb-120"
+seed = 11
+[arm.random]
+seed = 77
+a_mm = 0.3
+d_mm = 0.3
+alpha_deg = 0.04
+beta_deg = 0.03
+theta_deg = 0.1
+[[arm.effect]]
+effect = "backlash"
+joint = 0
+play_rad = 3.0e-4
+[[arm.effect]]
+effect = "joint-compliance"
+joint = 1
+compliance_rad_per_nm = 3e-5
+[[arm.effect]]
+effect = "gear-eccentricity"
+joint = 2
+order = 1.0
+sine_rad = 3e-4
+cosine_rad = 2e-4
+[poses]
+kind = "random"
+count = 300
+margin_deg = 5.0
+[view]
+box_mm = [[100.0, -550.0, 60.0], [650.0, 550.0, 900.0]]
+tilt_deg = 110.0
+[circumstances]
+approach = "random"
+hours = 3.0
+temperature = { start_c = 20.0, end_c = 33.0, time_constant_h = 1.0 }
+payload_kg = [0.0, 1.5]
+payload_centre_mm = [0,0,60]
+[sensor]
+kind = "position"
+frame = { position_mm = [2310.5, -640.2, 512.7], wxyz = [0.12, 0.02, -0.03, 0.99] }
+reflector_mm = [38.2, 12.6, 61.3]
+[noise]
+sigma_mm = 0.012
+joints_deg = 0.0005
+"#;
+    let load = |name: &str| robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
+    let simulation = Recipe::parse(recipe, "case").unwrap().simulate(load).unwrap();
+    let rows = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
+    let frames = candidate_frames(&rows, &simulation.nominal).unwrap();
+    let found = diagnose(&rows, "abb-irb-120", &simulation.nominal, &frames[0], &Options::default(), &|_| {})
+        .unwrap();
+    let is_of_joint = |effect: &&Effect| matches!(effect, Effect::JointCompliance(of) if of.joint == 1);
+    let written = found.estimated.model.effects.iter().find(is_of_joint).unwrap();
+    assert!(!written.is_zero());
+    let finding =
+        found.diagnosis.findings.iter().find(|finding| finding.effect == CauseKind::JointCompliance).unwrap();
+    assert!(finding.terms.len() > 1, "{finding:?}");
+    assert_eq!(finding.corrected, Some(true));
+    assert!(!finding.remedy.contains("leaves it out"), "{}", finding.remedy);
+    assert!(finding.remedy.contains("lacks a further term"), "{}", finding.remedy);
 }

@@ -13,7 +13,8 @@ use truegrind_arm::robots;
 use truegrind_calibration::identification::calibration::Frames;
 use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::stated_frame::{
-    contradicted_target, contradiction, judged_by_fit, target_contradiction_by_fit,
+    contradicted_target, contradiction, contradiction_beside_geometry, judged_by_fit,
+    target_contradiction_by_fit,
 };
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
@@ -98,6 +99,32 @@ fn a_frame_is_judged_by_what_the_fit_leaves_with_it() {
         assert!(wrong.is_some_and(|said| said.contains("without it")), "seed {seed}");
     }
     assert!(refused_by_nominal > 0, "the arm must be off by more than frames of the data sheet's arm may be");
+}
+
+/// Rows that geometry rejects as outliers are not among those of its fit, whose weights are asked for.
+#[test]
+fn a_frame_is_judged_beside_outliers() {
+    let nominal = robots::load("abb-irb-120").unwrap().model;
+    let mut dataset = small_box(0);
+    for row in [7, 31] {
+        let Reading::Position(at) = &mut dataset.rows[row].reading else { panic!("a position") };
+        at.x += 20.0;
+    }
+    let found = candidate_frames(&dataset, &nominal).unwrap().remove(0);
+    let touched = Pose::translation(TARGET_MM[0], TARGET_MM[1], TARGET_MM[2]);
+    let stated = Frames { base_from_sensor: tracker(), flange_from_target: touched, ..Frames::at_origin(1) };
+    for scale in [None, Some(1e-4)] {
+        let tolerance = Tolerance { target_mm: 0.05, scale, ..Tolerance::default() };
+        let of_arm = Tolerance { learn_widths: true, scale, ..Tolerance::default() };
+        let (judged, geometry) =
+            judged_by_fit([&tolerance, &of_arm], (&stated, &found), [0.02, 2e-5], (&dataset, &nominal));
+        assert_eq!(judged, Some(None));
+        let geometry = geometry.unwrap();
+        assert_eq!(geometry.rows.rows.len(), dataset.rows.len() - 2);
+        let beside = contradiction_beside_geometry(&dataset, geometry, &stated, [0.02, 2e-5], scale);
+        assert_eq!(beside, None);
+        assert_eq!(target_contradiction_by_fit(&of_arm, &touched, 0.5, &found, (&dataset, &nominal)), None);
+    }
 }
 
 /// Readings along a spiral about a blade, where the flange turns as it moves.

@@ -106,7 +106,9 @@ impl<'s> Interpreter<'_, 's> {
         let m: Vec<u32> = words.iter().filter_map(number).collect();
         if !m.is_empty() {
             let flags = Flags { skippable: block.flags.skippable, ..Flags::default() };
-            self.only_m_words(&Block { node: block.node, m, flags, ..Block::default() });
+            let of_text = Block { node: block.node, m, flags, ..Block::default() };
+            self.only_m_words(&of_text);
+            self.end_of_block(&of_text);
         }
     }
 

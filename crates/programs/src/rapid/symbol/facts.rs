@@ -192,7 +192,10 @@ impl Symbols {
                 Syntax::Call if self.is_motion(body.scope, name) => true,
                 Syntax::Call | Syntax::Function => match self.callees(body.scope, name) {
                     callees @ [_, ..] => callees.iter().any(|callee| self.effects_of(*callee).moves),
-                    [] => predefined::displaces(name).is_some() || predefined::effect(name).is_none(),
+                    [] => {
+                        predefined::displaces(name).is_some() && !predefined::keeps_path(name)
+                            || predefined::effect(name).is_none()
+                    }
                 },
                 _ => false,
             }

@@ -35,6 +35,12 @@ fn a_label_that_is_called_has_the_states_of_its_calls() {
     let sub = |body: &str| format!("CALL LBL 1\n{H}\nM30\nLBL 1\n{H}\n{body}\nLBL 0\nM129");
     check(Heidenhain, &sub(""), &[None, None]);
     check(Heidenhain, &sub("M129"), &[Some(NoTcpMode), None]);
+    // Most programs of that control end with a stop.
+    for end in ["STOP M30", "STOP M2", "M2"] {
+        let ended = format!("CALL LBL 1\nM129\n{end}\nLBL 1\n{H}\nLBL 0");
+        check(Heidenhain, &ended, &[None]);
+    }
+    check(Heidenhain, &format!("CALL LBL 1\nM129\nSTOP M5\nLBL 1\n{H}\nLBL 0"), &[FLOW]);
     check(Heidenhain, &sub("FN 9: IF +Q1 EQU +0 GOTO LBL 2\nM129\nLBL 2"), &[FLOW, None]);
     // Called with two tools, or in another mode.
     let twice = |between: &str| format!("CALL LBL 1\n{between}\nCALL LBL 1\nM30\nLBL 1\n{H}\nLBL 0");
