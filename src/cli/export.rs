@@ -152,6 +152,7 @@ fn measured_error(data: &DataArguments, arm: &Estimated, exported: &Model) -> an
         geometric: exported,
         extended: &arm.model,
         written: &arm.model,
+        condition: &arm.condition,
     };
     let found = transfer(&rows, &frames, &models, &tolerance, true);
     let relation = if rows.sha256 == arm.provenance.sha256 {

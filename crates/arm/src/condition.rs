@@ -17,3 +17,21 @@ pub struct Condition {
     /// Approach direction of each joint, in the sense of the controller's angle: −1 from below, +1 from above, 0 unknown.
     pub approach: [i8; 6],
 }
+
+impl Condition {
+    /// This condition with the time, temperature and payload of `other` where they are unknown.
+    #[must_use]
+    pub fn or(self, other: &Self) -> Self {
+        let (payload_kg, payload_centre_mm) = match self.payload_kg {
+            Some(_) => (self.payload_kg, self.payload_centre_mm),
+            None => (other.payload_kg, other.payload_centre_mm),
+        };
+        Self {
+            time_h: self.time_h.or(other.time_h),
+            temperature_c: self.temperature_c.or(other.temperature_c),
+            payload_kg,
+            payload_centre_mm,
+            approach: self.approach,
+        }
+    }
+}

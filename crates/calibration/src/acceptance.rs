@@ -209,6 +209,8 @@ pub fn accept(
     if is_of_the_fit(dataset, estimated) {
         return Err(AcceptError::RowsOfTheFit { file: dataset.file.clone() });
     }
+    let logged = dataset;
+    let dataset = &logged.at_unless_logged(&estimated.condition);
     let (all, _) = prepare_observations(dataset, &estimated.nominal, true);
     let observed = at_rest(&all)?;
     let paths = paths(&all, &observed, &estimated.model, options)?;
@@ -267,9 +269,9 @@ pub fn accept(
         paths,
         coverage: Coverage::of(dataset, estimated),
         conditions: [
-            range(dataset, |condition| condition.time_h),
-            range(dataset, |condition| condition.temperature_c),
-            range(dataset, |condition| condition.payload_kg),
+            range(logged, |condition| condition.time_h),
+            range(logged, |condition| condition.temperature_c),
+            range(logged, |condition| condition.payload_kg),
         ],
         model,
     })

@@ -542,7 +542,7 @@ fn conditions(found: &Acceptance, estimated: &Estimated) -> Table {
         let [least, most] = [0, 1].map(|k| Cell::from(range.map(|range| range[k])));
         table.push([name.into(), unit.into(), least, most, model.into()]);
     }
-    table.notes.push("–: not logged.".to_owned());
+    table.notes.push("–: not logged; what the model depends on is then taken as in its own rows.".to_owned());
     table
 }
 

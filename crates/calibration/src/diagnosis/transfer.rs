@@ -17,6 +17,7 @@ use crate::identification::misreading::OTHER_ARM_MM;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Row, Sensor};
 use crate::measurement::sensor::disturbance::Disturbance;
+use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Judgement;
 use truegrind_arm::model::Model;
 use truegrind_math::statistics::{ErrorSummary, rms};
@@ -34,6 +35,8 @@ pub struct Models<'a> {
     pub faults: &'a [Disturbance],
     /// For compensation.
     pub written: &'a Model,
+    /// The condition in which they count where rows of the other series do not say theirs.
+    pub condition: &'a Condition,
 }
 
 /// Root mean square errors (mm) of models on `other`, with the frames refitted, links and effects unchanged. `fuse_readout` as for the
@@ -56,7 +59,7 @@ fn errors_of(
     tolerance: &Tolerance,
     fuse_readout: bool,
 ) -> ([Vec<f64>; 4], Observations) {
-    let prepared = prepare(other, models.nominal, fuse_readout);
+    let prepared = prepare(&other.at_unless_logged(models.condition), models.nominal, fuse_readout);
     let mut with_faults = frames.clone();
     with_faults.disturbances.extend_from_slice(models.faults);
     let all = [
@@ -235,6 +238,7 @@ impl Diagnosed {
             extended: &self.extended.model,
             faults: &faults,
             written: &self.estimated.model,
+            condition: &self.estimated.condition,
         };
         let (errors, observed) = errors_of(other, frames, &models, tolerance, fuse_readout);
         let foreign = self.foreign(&errors, &observed, frames, tolerance);

@@ -5,6 +5,7 @@ mod rows;
 
 pub use self::row::{Extra, Motion, PathPoint, Reading, Row};
 pub use self::rows::{Iter, Rows};
+use truegrind_arm::condition::Condition;
 pub use truegrind_arm::sensor::Sensor;
 
 /// A measurement file.
@@ -58,6 +59,20 @@ impl Dataset {
     /// The same file with only the rows at `indices` of [`Dataset::rows`].
     pub fn subset(&self, indices: &[usize]) -> Self {
         Self { rows: self.rows.select(indices), ..self.clone() }
+    }
+
+    /// The same rows, those without a logged time, temperature or payload at that of `condition`. Programs are corrected for the condition of
+    /// the model's own rows: an arm that had warmed up there is not judged as a cold one because later rows have no clock.
+    #[must_use]
+    pub fn at_unless_logged(&self, condition: &Condition) -> Self {
+        let mut out = self.clone();
+        for row in &mut out.rows {
+            let known = row.condition.or(condition);
+            if known != *row.condition {
+                row.condition = known.into();
+            }
+        }
+        out
     }
 
     /// Number of cable outlets; 1 without a cable.

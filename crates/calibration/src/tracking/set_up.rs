@@ -35,8 +35,9 @@ impl Tracker {
     ) -> Result<bool, TrackError> {
         let station = station_of(dataset, from);
         let (_, frames) = self.current();
-        let Some(placed) = self.place((from..end).map(|row| &dataset.rows[row]).take(ENOUGH).collect())
-        else {
+        let first: Vec<usize> = (from..end).take(ENOUGH).collect();
+        let first = dataset.subset(&first).at_unless_logged(&self.initial.condition);
+        let Some(placed) = self.place(first.rows.iter().collect()) else {
             let station = station.unwrap_or_default();
             let (file, rows) = (dataset.file.clone(), end - from);
             return if is_over { Err(TrackError::Station { file, station, rows }) } else { Ok(false) };

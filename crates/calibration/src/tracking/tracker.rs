@@ -141,6 +141,7 @@ impl Tracker {
             found: dataset.rows.len(),
             asked: options.first_poses,
         })?;
+        let first = first.at_unless_logged(&model.condition);
         let (observed, _) = prepare_observations(&first, &model.nominal, false);
         let FirstPoses { frames, sigma_mm, sigma_rad } = FirstPoses::of(model, &observed, options)?;
         let sensing = frame_parameters(&observed.dataset);
@@ -285,7 +286,7 @@ impl Tracker {
 
     /// Filters rows that were read from one place, which `begins` with them or not.
     fn process_rows(&mut self, dataset: &Dataset, rows: Range<usize>, begins: bool) -> Vec<Alarm> {
-        let mut fresh = dataset.subset(&rows.collect::<Vec<_>>());
+        let mut fresh = dataset.subset(&rows.collect::<Vec<_>>()).at_unless_logged(&self.initial.condition);
         let track_from_station = self.track_from_station();
         fresh.rows.iter_mut().for_each(|row| *row = moved(row, &track_from_station));
         let (observed, _) = prepare_observations(&fresh, &self.initial.nominal, false);

@@ -4,6 +4,8 @@ mod path;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
 use truegrind_arm::robots;
@@ -94,6 +96,34 @@ fn an_unknown_uncertainty_accepts_nothing() {
     let found = of(1.0);
     assert_eq!((found.uncertainty, found.decision), (Uncertainty::Unknown, Decision::Open));
     assert_eq!(of(0.5 * found.model.max).decision, Decision::Refused);
+}
+
+/// Programs are corrected for the arm as warm as in the rows of the fit: later rows without a clock judge that arm, not a cold one.
+#[test]
+fn an_arm_that_had_warmed_up_is_not_judged_as_a_cold_one() {
+    let mut model = model(&dataset(rows(0.1, 120)));
+    model.model.effects.push(Effect::ThermalDrift(Thermal {
+        growth: 1e-3,
+        time_constant_h: 0.5,
+        start_h: 0.0,
+        growth_per_k: 0.0,
+        reference_c: 20.0,
+    }));
+    model.condition.time_h = Some(2.0);
+    let warm = model.model.at_condition(&model.condition);
+    let mut other = rows(0.7, 110);
+    for row in &mut other {
+        row.reading = Reading::Position(warm.forward(&row.joints).translation.vector);
+    }
+    let found = accept(&dataset(other.clone()), &model, &options(0.1)).unwrap();
+    assert!(found.model.max < 0.001, "{:?}", found.model);
+    assert_eq!((found.decision, found.conditions), (Decision::Accepted, [None; 3]));
+    // A clock counts.
+    for row in &mut other {
+        row.condition = Condition { time_h: Some(0.0), ..Condition::default() }.into();
+    }
+    let cold = accept(&dataset(other), &model, &options(0.1)).unwrap();
+    assert_eq!((cold.decision, cold.conditions[0]), (Decision::Refused, Some([0.0; 2])));
 }
 
 /// An error that is stated of rows of the fit is none: whatever the file is called, and if rows are left out.

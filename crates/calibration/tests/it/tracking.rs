@@ -6,6 +6,9 @@ mod set_ups;
 
 use std::sync::OnceLock;
 
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::estimated::Estimated;
 use truegrind_calibration::identification::identify::{self, identify};
 use truegrind_calibration::identification::solver::SOLVERS;
@@ -117,6 +120,32 @@ fn a_joint_that_lost_its_zero_is_named_with_its_size_and_its_pose() {
     assert!(after.verdict.reasons.iter().any(|r| r.text == alarm.to_string()));
     let again = Estimated::from_toml(&after.to_toml().unwrap()).unwrap();
     assert_eq!(again.model.links[2].theta_rad.to_degrees(), after.model.links[2].theta_rad.to_degrees());
+}
+
+/// Rows without a clock are of the arm as warm as when it was identified, and the tracked model is used so.
+#[test]
+fn an_arm_that_had_warmed_up_is_not_tracked_as_a_cold_one() {
+    let mut warm = model().clone();
+    warm.model.effects.push(Effect::ThermalDrift(Thermal {
+        growth: 1e-3,
+        time_constant_h: 0.5,
+        start_h: 0.0,
+        growth_per_k: 0.0,
+        reference_c: 20.0,
+    }));
+    warm.condition.time_h = Some(20.0);
+    let mut dataset = measured(2, None);
+    for row in &mut dataset.rows {
+        let flange = warm.model.forward(&row.joints, &warm.condition);
+        row.reading = Reading::Position((flange * nalgebra::Point3::new(38.2, 12.6, 61.3)).coords);
+        row.condition = Condition::default().into();
+    }
+    let mut tracker = Tracker::begin(&warm, "hash", &dataset, &Options::default()).unwrap();
+    let alarms = tracker.process_file(&dataset).unwrap();
+    assert!(alarms.is_empty(), "{alarms:?}");
+    let departure = tracker.departure().unwrap();
+    assert!(!departure.is_significant, "{departure:?}");
+    assert_eq!(tracker.model().condition.time_h, Some(20.0));
 }
 
 #[test]
