@@ -439,9 +439,9 @@ fn without_measurement_causes(
     let SearchContext { dataset, subject, .. } = search.context;
     let correlated = discrepancy.filter(|d| d.correlation > 0.0);
     let without = written(search, &of_the_arm, correlated);
-    let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
+    let region = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let beside = in_doubt::with_zero_causes(&without, certain.fit.clone());
-    match apart(&certain.fit, &beside, &median_condition(dataset), &samples) {
+    match apart(&certain.fit, &beside, &median_condition(dataset), &region) {
         Some(apart) if apart.probability_worse > sensor_causes::MAX_PROBABILITY => {
             let written = WrittenFit { errors: search.validation.stage(&without), fit: without };
             (written, Some(LeftOut { fit: certain.fit, apart }))

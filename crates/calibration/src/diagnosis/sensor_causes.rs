@@ -13,6 +13,7 @@ use super::extension::Extended;
 use crate::identification::fit::Fitted;
 use crate::identification::shape_metric::shape_metric;
 use truegrind_arm::condition::Condition;
+use truegrind_arm::region::Region;
 use truegrind_math::tail::normal_cdf;
 
 /// Largest probability of a worse arm up to which the written arm is fitted with the causes of the measurement.
@@ -31,9 +32,9 @@ pub(super) fn apart(
     with: &Extended,
     without: &Extended,
     condition: &Condition,
-    samples_deg: &[[f64; 6]],
+    region: &Region,
 ) -> Option<Apart> {
-    let weights = shape_metric(&Fitted::from(with), condition, samples_deg)?;
+    let weights = shape_metric(&Fitted::from(with), condition, region)?;
     let covariance = with.estimate.covariance.as_ref()?;
     let apart = nalgebra::DVector::from_fn(with.x.len(), |k, _| with.x[k] - without.x[k]);
     let along = &weights * &apart;

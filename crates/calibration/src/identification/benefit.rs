@@ -187,7 +187,7 @@ fn expected_benefit(
     tolerance: &Tolerance,
     variance_inflation: f64,
 ) -> Option<Benefit> {
-    let metric = shape_metric(fitted, &estimated.condition, &estimated.region.samples_deg)?;
+    let metric = shape_metric(fitted, &estimated.condition, &estimated.region)?;
     let mut readings = linearise_readings(fitted, dataset, SensorLaw::of(dataset.sensor));
     readings.project_scale_onto_arm(fitted, tolerance)?;
     let x = DVector::from_column_slice(&fitted.estimate.x);

@@ -8,16 +8,13 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::jacobian::{BaseAndTool, parameter_jacobian};
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
+use truegrind_arm::region::Region;
 use truegrind_math::se3::{Pose, vector_from_pose};
 
-/// M at `condition` over the region spanned by the poses `samples_deg` (°). δᵀ M δ is the mean square displacement (mm²) of the
+/// M at `condition` over a region. δᵀ M δ is the mean square displacement (mm²) of the
 /// target by a change δ of the fit's parameters, rigid motions of base and target projected out. Rows and columns of
 /// measurement parameters are zero.
-pub(crate) fn shape_metric(
-    fitted: &Fitted,
-    condition: &Condition,
-    samples_deg: &[[f64; 6]],
-) -> Option<DMatrix<f64>> {
+pub(crate) fn shape_metric(fitted: &Fitted, condition: &Condition, region: &Region) -> Option<DMatrix<f64>> {
     let indices: Vec<usize> =
         fitted.parameters.iter().enumerate().filter(|(_, p)| p.is_of_arm()).map(|(k, _)| k).collect();
     let mut list: Vec<Parameter> = indices.iter().map(|&k| fitted.parameters[k]).collect();
@@ -30,7 +27,7 @@ pub(crate) fn shape_metric(
     let target =
         Pose::from_parts(fitted.frames.flange_from_target.translation, nalgebra::UnitQuaternion::identity());
     let ends = BaseAndTool { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(&target) };
-    let poses = judged_poses(samples_deg);
+    let poses = judged_poses(region);
     let mut stack = DMatrix::zeros(3 * poses.len(), list.len());
     for (k, q) in poses.iter().enumerate() {
         let twists = parameter_jacobian(&ends, &posed, q, &list);
@@ -64,15 +61,24 @@ pub(crate) fn shape_metric(
     out.iter().all(|v| v.is_finite()).then_some(out)
 }
 
-/// Poses of the measured region: its samples and the midpoints of pairs of them, so that a fit of few rows is not judged only
-/// at the poses that it was fitted to.
-fn judged_poses(samples_deg: &[[f64; 6]]) -> Vec<Joints> {
-    let n = samples_deg.len();
-    let radians = |q: [f64; 6]| Joints::from_fn(|i, _| q[i].to_radians());
-    let mut out: Vec<Joints> = samples_deg.iter().map(|q| radians(*q)).collect();
-    for (k, a) in samples_deg.iter().enumerate() {
-        let b = &samples_deg[(k + n / 3 + 1) % n];
-        out.push(radians(std::array::from_fn(|i| 0.5 * (a[i] + b[i]))));
+/// Poses at which a change is judged: placed on few, base and target would take up part of the shape.
+const JUDGED: usize = 200;
+
+/// Poses inside the region, none of them measured: at its own poses a fit of few rows is nearer to the arm than at any others. Each joint is
+/// that of another sample, so that it is distributed as in the measurement. Where such poses leave the region, as along a path, it is the
+/// samples and the midpoints of pairs of them.
+fn judged_poses(region: &Region) -> Vec<Joints> {
+    let samples = &region.samples_deg;
+    let n = samples.len();
+    let sample = |k: usize| samples[k % n].map(f64::to_radians);
+    let rounds = JUDGED.div_ceil(n.max(1)).min(n.saturating_sub(1)).max(1);
+    let steps = (0..rounds).map(|round| 1 + round * n.saturating_sub(1) / rounds);
+    let recombined =
+        steps.flat_map(|step| (0..n).map(move |k| Joints::from_fn(|i, _| sample(k + i * step)[i])));
+    let mut out: Vec<Joints> = recombined.filter(|q| region.outside(q).is_none()).collect();
+    if out.len() < n {
+        out = (0..n).map(|k| Joints::from(sample(k))).collect();
+        out.extend((0..n).map(|k| 0.5 * (Joints::from(sample(k)) + Joints::from(sample(k + n / 3 + 1)))));
     }
     out
 }

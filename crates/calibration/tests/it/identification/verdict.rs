@@ -12,7 +12,7 @@ use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::identification::verdict::{Limits, VerdictBuilder};
 use truegrind_calibration::measurement::dataset::{Dataset, Reading};
 use truegrind_calibration::measurement::{import, split};
-use truegrind_math::statistics::ErrorSummary;
+use truegrind_math::statistics::{ErrorSummary, rms};
 
 use super::promise::{Case, Outcome};
 
@@ -141,6 +141,25 @@ fn few_noisy_rows_make_a_doubtful_model() {
         doubtful += usize::from(outcome.status == Some(Judgement::Doubtful));
     }
     assert!(doubtful > 0);
+}
+
+/// At its own poses a fit of few rows is nearer to the arm than at any others: both errors were stated a fifth to a third too small.
+#[test]
+fn errors_promised_from_few_poses_are_those_of_fresh_poses() {
+    for rows in [20, 40] {
+        let (mut of_estimate, mut of_nominal) = (Vec::new(), Vec::new());
+        for seed in 0..30 {
+            let robot = ARMS[seed as usize % ARMS.len()];
+            let outcome = Case { seed, robot, ..tracker(rows, 0.1, 0.0) }.outcome();
+            let benefit = outcome.found.as_ref().unwrap().benefit.unwrap();
+            of_nominal.push(outcome.rms_mm[0] / benefit.nominal_mm);
+            of_estimate.push(outcome.rms_mm[1] / benefit.estimated_mm);
+        }
+        let [nominal, estimate] = [&of_nominal, &of_estimate].map(|ratios| rms(ratios).unwrap());
+        assert!((0.9..1.1).contains(&nominal), "{rows} rows: nominal arm {nominal}");
+        // Held-out errors may widen what is expected of the estimate, and never narrow it.
+        assert!((0.8..1.15).contains(&estimate), "{rows} rows: estimated arm {estimate}");
+    }
 }
 
 /// What is measured soundly is written, from forty rows on, whichever the sensor and the arm.
