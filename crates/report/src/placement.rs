@@ -8,11 +8,13 @@ use serde_json::{Value, json};
 use super::table::{Column, Table};
 use truegrind_calibration::identification::verdict::{MAX_PERCENT, MIN_PERCENT, percent_of};
 use truegrind_compensation::line_list::numbered;
+use truegrind_compensation::plan::reason::OutcomeReason;
+use truegrind_compensation::plan::steps_to_left::is_path;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_compensation::risk::remedy::Remedy;
-use truegrind_programs::motion::Listing;
+use truegrind_programs::motion::{Listing, Motion, Place, Reason};
 
 /// A work object of a program, and what of it is corrected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -92,34 +94,55 @@ fn share(placement: &ObjectPlacement, plan: &Plan, listing: &Listing) -> String 
 /// By how much cuts may come apart without a word (mm RMS).
 const APART_MM: f64 = 0.05;
 
-/// Sentence for a work object whose placement is corrected in some cuts and not in others: passes over one contour come apart.
+/// Sentence for a work object whose placement is corrected in some cuts and not in others: passes over one contour come apart. Uncorrected
+/// lines of which the text does not tell the place, as of a routine with its target as parameter, lie off by as much as the path as a whole.
 fn left_behind(placement: &ObjectPlacement, plan: &Plan, listing: &Listing) -> Option<String> {
     if placement.applied != Placement::Absolute {
         return None;
     }
-    let is_here = |cut: &&CutRisk| {
-        let first = cut.motions.first().and_then(|motion| listing.motions.get(*motion as usize));
-        let object = first.and_then(|motion| listing.work_object(motion));
-        object.is_some_and(|object| names(placement).any(|name| name == object.name))
+    let motion_at = |index: &u32| listing.motions.get(*index as usize);
+    let is_here = |motion: &Motion| {
+        listing.work_object(motion).is_some_and(|object| names(placement).any(|name| name == object.name))
     };
-    let cuts = || plan.cuts.iter().filter(is_here);
-    let left: Vec<&CutRisk> = cuts().filter(|cut| !cut.corrected && cut.deviation_mm > APART_MM).collect();
-    if left.is_empty() || !cuts().any(|cut| cut.corrected) {
+    let cuts = || plan.cuts.iter().filter(|cut| cut.motions.first().and_then(motion_at).is_some_and(is_here));
+    if !cuts().any(|cut| cut.corrected) {
         return None;
     }
-    let mm = left.iter().map(|cut| cut.deviation_mm).fold(0.0, f64::max);
-    let starts = left.iter().filter_map(|cut| listing.motions.get(*cut.motions.first()? as usize));
-    let lines = numbered(&listing.files, starts.map(|motion| motion.place)).unwrap_or_default();
-    let (begin, stay) = if left.len() == 1 {
-        ("the cut that begins", "stays where it is")
-    } else {
-        ("cuts that begin", "stay where they are")
+    let left: Vec<&CutRisk> = cuts().filter(|cut| !cut.corrected && cut.deviation_mm > APART_MM).collect();
+    let unknown: Vec<Place> = plan
+        .outcomes
+        .iter()
+        .filter(|outcome| is_left_at_unknown_place(outcome))
+        .filter_map(|outcome| motion_at(&outcome.motion))
+        .filter(|motion| is_path(motion) && is_here(motion))
+        .map(|motion| motion.place)
+        .collect();
+    let unknown_mm = (!unknown.is_empty()).then_some(placement.deviation_mm).filter(|mm| *mm > APART_MM);
+    let mm = left.iter().map(|cut| cut.deviation_mm).chain(unknown_mm).reduce(f64::max)?;
+    let of_cuts = left.iter().filter_map(|cut| cut.motions.first()).filter_map(motion_at);
+    let mut places: Vec<Place> = of_cuts.map(|motion| motion.place).collect();
+    if unknown_mm.is_some() {
+        places.extend(unknown);
+        places.sort_by_key(|place| (place.file, place.line, place.column));
+    }
+    let (begin, stay) = match (places.len(), unknown_mm) {
+        (1, None) => ("the cut that begins at", "stays where it is"),
+        (_, None) => ("cuts that begin at", "stay where they are"),
+        (1, Some(_)) => ("what is cut at", "stays where it is"),
+        (_, Some(_)) => ("cuts at", "stay where they are"),
     };
+    let lines = numbered(&listing.files, places.into_iter()).unwrap_or_default();
     let named = named(placement, object_word(listing));
     Some(format!(
-        "{named}: {begin} at {lines} {stay}, while others move by the correction: passes over one contour then lie up to {mm:.3} mm apart. \
+        "{named}: {begin} {lines} {stay}, while others move by the correction: passes over one contour then lie up to {mm:.3} mm apart. \
          Correct all of them, or the shape alone (--placement shape)"
     ))
+}
+
+/// Whether a motion is left of which the text does not tell the place, unless it is counted from where the robot stands, and with it moves.
+fn is_left_at_unknown_place(outcome: &MotionOutcome) -> bool {
+    let follows = OutcomeReason::Program(Reason::CurrentPosition);
+    !outcome.status.is_written() && outcome.before_mm.get().is_none() && outcome.reason() != Some(follows)
 }
 
 /// Sentence for stationary objects of which some are corrected in placement and others are not: the distances between them change.

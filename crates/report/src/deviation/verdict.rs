@@ -1,11 +1,13 @@
 //! Verdict on a corrected path.
 
+use std::collections::BTreeSet;
+
 use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
 use crate::document::PageVerdict;
 use crate::status::Status;
 use truegrind_compensation::deviation::{
-    BetweenTargets, MissingMotions, MotionStatus, PathPoint, PathReport,
+    After, BetweenTargets, MissingMotions, MotionStatus, PathPoint, PathReport,
 };
 use truegrind_compensation::line_list::numbered;
 use truegrind_programs::motion::Place;
@@ -38,6 +40,7 @@ pub(super) fn verdict(reports: &[&PathReport], risk: Risk) -> PageVerdict {
         found.extend(between_targets(report));
         found.extend(turns(report));
         found.extend(of_certainty(report, risk));
+        found.extend(remainder(report).map(|left| (Status::Warning, left.words(report))));
     }
     found.extend(missing(reports));
     let holds = |status: &Status| found.iter().any(|(of, _)| of == status);
@@ -111,6 +114,52 @@ fn of_certainty(report: &PathReport, risk: Risk) -> Option<Reason> {
         );
         (Status::Warning, words)
     })
+}
+
+/// Standard deviations of the model from which what it expects to remain is no uncertainty but a deviation, and the least that counts (mm).
+const CERTAIN_SIGMAS: f64 = 3.0;
+const CERTAIN_MM: f64 = 0.05;
+
+/// What the model knows to remain at corrected points, though it would correct it: they were corrected for another arm, twice, or by hand.
+struct Remainder {
+    largest_mm: f64,
+    sigma_mm: f64,
+    lines: String,
+}
+
+impl Remainder {
+    fn words(&self, report: &PathReport) -> String {
+        format!(
+            "{}: targets are not corrected as this model would: up to {:.3} mm remain, known to ± {:.3} mm (1σ), as after a correction for \
+             another arm, a second one, or a change by hand ({})",
+            report.model, self.largest_mm, self.sigma_mm, self.lines
+        )
+    }
+}
+
+/// What is known to remain; `None` where nothing is. Where the shape alone is corrected the placement stays, by choice.
+fn remainder(report: &PathReport) -> Option<Remainder> {
+    if report.after == After::Achieved || only_shape(report).is_some() {
+        return None;
+    }
+    let known = |point: &PathPoint| {
+        let (mm, sigma) = (point.after?.norm_mm(), point.sigma_mm?);
+        (point.is_corrected() && mm > CERTAIN_MM.max(CERTAIN_SIGMAS * sigma)).then_some((mm, sigma))
+    };
+    let parts: BTreeSet<u32> = report.cut().filter(|p| known(p).is_some()).map(|p| p.part).collect();
+    let is_known_place = |part: &u32| {
+        let points = report.cut().filter(|point| point.part == *part).cloned().collect();
+        let alone = PathReport { points, ..report.clone() };
+        alone.registered_rms_mm(AFTER).is_some() && only_shape(&alone).is_none()
+    };
+    let parts: BTreeSet<u32> = parts.into_iter().filter(is_known_place).collect();
+    let left: Vec<&PathPoint> =
+        report.cut().filter(|point| parts.contains(&point.part) && known(point).is_some()).collect();
+    let (largest_mm, sigma_mm) =
+        left.iter().filter_map(|point| known(point)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let places = left.iter().map(|point| Place { file: point.file, line: point.line, column: 0 });
+    let lines = numbered(&report.files, places)?;
+    Some(Remainder { largest_mm, sigma_mm, lines })
 }
 
 /// The path between the targets of the corrected program.
@@ -286,7 +335,11 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
                 points.filter_map(PathPoint::expected_mm).filter(|mm| mm.is_finite()).reduce(f64::max)
             };
             // A deviation that stays is no standard deviation.
+            let remains = remainder(report);
             let after = match (largest(true), largest(false)) {
+                _ if let Some(Remainder { largest_mm, sigma_mm, .. }) = remains => {
+                    format!("after correction {largest_mm:.3} mm, known to ± {sigma_mm:.3} mm (1σ)")
+                }
                 (Some(sigma), None) => {
                     format!("after correction a standard deviation (1σ) of at most {sigma:.3} mm is expected")
                 }

@@ -413,6 +413,18 @@ fn cuts_that_stay_behind_are_named() {
         plan.cuts = vec![cut(0, corrected), cut(2, corrected)];
         assert!(!said(&plan).contains("apart"), "{corrected}");
     }
+    // Of a line that is left the text does not tell the place: it is off by what the path as a whole is.
+    plan.cuts = vec![cut(1, true)];
+    let left = plan.outcomes.iter().position(|outcome| outcome.motion == 6).unwrap();
+    plan.outcomes[left].before_mm = OptionF64::NONE;
+    let text = said(&plan);
+    assert!(text.contains("wobj0: what is cut at line "), "{text}");
+    assert!(text.contains("passes over one contour then lie up to 1.100 mm apart"), "{text}");
+    let counted = Some(OutcomeReason::Program(Reason::CurrentPosition));
+    let mut lifted = plan.clone();
+    lifted.outcomes[left] = outcome(6, MotionStatus::Left, counted);
+    lifted.outcomes[left].before_mm = OptionF64::NONE;
+    assert!(!said(&lifted).contains("apart"));
     // Where the shape alone is corrected, they do not move against each other.
     plan.cuts = vec![cut(0, true), cut(2, false)];
     plan.placements[0].applied = Placement::Shape;

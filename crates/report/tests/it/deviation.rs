@@ -616,6 +616,35 @@ fn what_stays_is_not_called_a_standard_deviation() {
     assert!(!headline(&report).contains('σ'), "{}", headline(&report));
 }
 
+/// What a program that was corrected for another arm, twice or by hand leaves of a correction is known: it was called a σ, and the verdict was ok.
+#[test]
+fn a_remainder_that_the_model_knows_is_no_standard_deviation() {
+    let page = |report: &PathReport| {
+        terminal::document(&view::summary("blade.mod", std::slice::from_ref(report)), 300)
+    };
+    let mut report = raster("m", After::PredictedRemainder, 1e-4);
+    for (k, point) in report.points.iter_mut().enumerate() {
+        let bent = 0.05 * (k % 3) as f64;
+        (point.status, point.sigma_mm) = (MotionStatus::Changed, Some(0.05));
+        point.before = Some(deviation([4.0, bent, 0.0], false));
+        point.after = Some(deviation([1.0, 0.2 * bent, 0.0], false));
+    }
+    let text = page(&report);
+    assert!(text.contains("[warning] Largest deviation"), "{text}");
+    assert!(text.contains("after correction 1.000 mm, known to ± 0.050 mm (1σ)"), "{text}");
+    assert!(text.contains("targets are not corrected as this model would"), "{text}");
+    // Within three σ, and where only the shape was to be corrected, nothing is.
+    for point in &mut report.points {
+        point.sigma_mm = Some(0.5);
+    }
+    assert!(!page(&report).contains("not corrected as this model would"));
+    for point in &mut report.points {
+        (point.sigma_mm, point.after) = (Some(0.05), Some(deviation([4.0, 0.0, 0.0], false)));
+    }
+    let text = page(&report);
+    assert!(text.contains("[ok] Shape of the path") && !text.contains("as this model would"), "{text}");
+}
+
 /// Points of two parts, or in two axes on one, were registered as if their numbers were of one frame.
 #[test]
 fn the_shape_is_that_of_each_part() {
