@@ -43,7 +43,7 @@ pub(super) struct Arguments {
     model: Vec<String>,
     #[command(flatten)]
     robot: StatedRobot,
-    /// Original program, which defines the intended path; PROGRAM is then its corrected version.
+    /// Original program, which defines the intended path, or with --together a folder that is one task; PROGRAM is then its corrected version.
     #[arg(long, value_name = "ORIGINAL")]
     intended: Vec<PathBuf>,
     /// Largest deviation of the corrected path from the intended one between two targets (mm); use the value that was given to `compensate`.
@@ -88,7 +88,10 @@ fn check_combinations(arguments: &Arguments, jobs: usize, several: bool) -> anyh
         bail!("--tolerance {}: expected a length above 0 in mm", arguments.tolerance);
     }
     if several && !arguments.intended.is_empty() {
-        bail!("--intended is the original of one program: name one program, not {jobs}");
+        bail!(
+            "--intended is the original of one program, and these are {jobs}: name one program or task and its original, or a folder that is one \
+             task for both, with --together"
+        );
     }
     if arguments.shares.on() && arguments.outputs.rrd.is_some() {
         bail!(
@@ -120,15 +123,34 @@ impl Arguments {
     }
 }
 
+/// The program of `--intended`: files, or a folder that is one task.
+fn original(arguments: &Arguments) -> anyhow::Result<Option<Programs>> {
+    let named = &arguments.intended;
+    if !named.iter().any(|path| path.is_dir()) {
+        return if named.is_empty() { Ok(None) } else { Ok(Some(Programs::read(named)?)) };
+    }
+    let mut jobs = programs::jobs(named, arguments.grouping)?;
+    programs::drop_without_motion(&mut jobs)?;
+    let [job] = jobs.as_slice() else {
+        bail!(
+            "--intended: {} programs lie in that folder: name the original, or make the folder one task with --together",
+            jobs.len()
+        );
+    };
+    Ok(Some(Programs::read(&job.paths)?))
+}
+
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut jobs = match arguments.shares.listed()? {
         Some(jobs) => jobs,
         None => programs::jobs(&arguments.programs, arguments.grouping)?,
     };
+    if !arguments.intended.is_empty() {
+        programs::drop_without_motion(&mut jobs)?;
+    }
     let several = jobs.len() > 1 || arguments.shares.on();
     check_combinations(arguments, jobs.len(), several)?;
-    let originals =
-        if arguments.intended.is_empty() { None } else { Some(Programs::read(&arguments.intended)?) };
+    let originals = original(arguments)?.map(|original| original.in_order_of(&jobs));
     let all: Vec<PathBuf> = jobs
         .iter()
         .flat_map(|job| &job.paths)

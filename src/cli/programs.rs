@@ -282,6 +282,24 @@ fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result
     Ok(())
 }
 
+/// Drops the programs that move nothing from several, such as the tasks of a backup that only handle signals.
+pub(super) fn drop_without_motion(jobs: &mut Vec<Job>) -> anyhow::Result<()> {
+    if jobs.len() < 2 {
+        return Ok(());
+    }
+    let mut moving = Vec::new();
+    for job in &*jobs {
+        let files = Programs::read(&job.paths)?;
+        if !files.task(&Setup::default()).listing().motions.is_empty() {
+            moving.push(job.clone());
+        }
+    }
+    if !moving.is_empty() {
+        *jobs = moving;
+    }
+    Ok(())
+}
+
 /// The folder of the task in a controller backup in which a module lies: `…/RAPID/TASK1`.
 fn task_folder(path: &Path) -> Option<&Path> {
     let is = |folder: &Path, test: &dyn Fn(&str) -> bool| {
@@ -358,6 +376,18 @@ impl Programs {
             bail!("no module to read: the task list names none");
         }
         Ok(Self { files, lists })
+    }
+
+    /// The same files in the order of those of the same names in `jobs`, where these are as many: motions are listed file by file.
+    pub(super) fn in_order_of(mut self, jobs: &[Job]) -> Self {
+        let name = |path: &Path| files::name(path).to_lowercase();
+        let wanted: Vec<String> = jobs.iter().flat_map(Job::files).map(|path| name(&path)).collect();
+        let own: BTreeSet<String> = self.files.iter().map(|(path, _)| name(path)).collect();
+        let others: BTreeSet<String> = wanted.iter().cloned().collect();
+        if own == others && own.len() == self.files.len() {
+            self.files.sort_by_key(|(path, _)| wanted.iter().position(|other| *other == name(path)));
+        }
+        self
     }
 
     /// Name and SHA-256 of every file read, for the key of the unit.

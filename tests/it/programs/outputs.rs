@@ -157,6 +157,15 @@ fn a_backup_is_read_by_tasks() {
     assert!(code == 0 || code == 1, "{text}\n{err}");
     assert!(err.contains("in no task of the backup") && err.contains("Old.mod"), "{err}");
     assert_ne!(fs::read_to_string(at.join("out/RAPID/TASK1/PROGMOD/Work.mod")).unwrap(), work);
+    // The corrected backup is judged beside the whole original, of which one task moves nothing.
+    let judge = |intended: &str, more: &[&str]| {
+        let arguments = ["deviation", "out", "--intended", intended, "--model", "model.toml"];
+        truegrind(at, &[&arguments[..], more].concat())
+    };
+    let (code, text, err) = judge("b", &["--together"]);
+    assert!(code < 2 && text.contains("Deviation of Work.mod"), "{text}{err}");
+    let (code, _, err) = judge("b", &[]);
+    assert!(code == 2 && err.contains("--together"), "{err}");
     // Two tasks that move are two arms, or an arm and something else.
     fs::write(at.join("b/RAPID/TASK2/PROGMOD/Other.mod"), module("Other", 5, 0.0)).unwrap();
     let (code, _, err) = run("two");
@@ -223,6 +232,29 @@ fn modules_of_a_folder_are_one_task_when_asked() {
         truegrind(at, &["deviation", "backup", "--together", "--model", "model.toml", "--csv", "points.csv"]);
     assert_eq!(code, 0, "{text}\n{err}");
     assert_eq!(fs::read_to_string(at.join("points.csv")).unwrap().lines().count(), 6);
+}
+
+/// Motions are listed file by file: two modules that are named in another order than those of the original were another program.
+#[test]
+fn the_order_in_which_modules_are_named_does_not_matter() {
+    let dir = workshop();
+    let at = dir.path();
+    for folder in ["in", "out"] {
+        fs::create_dir_all(at.join(folder)).unwrap();
+    }
+    fs::write(at.join("in/a.mod"), module("A", 5, 0.0)).unwrap();
+    fs::write(at.join("in/b.mod"), module("B", 5, 60.0).replace("main", "second")).unwrap();
+    let (code, text, err) =
+        truegrind(at, &["compensate", "in/a.mod", "in/b.mod", "--model", "model.toml", "-o", "out"]);
+    assert!(code < 2, "{text}{err}");
+    let judge = |files: [&str; 2]| {
+        let intended = ["--intended", "in/a.mod", "--intended", "in/b.mod", "--model", "model.toml"];
+        truegrind(at, &[&["deviation", files[0], files[1]], &intended[..]].concat())
+    };
+    let (code, text, err) = judge(["out/a.mod", "out/b.mod"]);
+    assert!(code < 2, "{text}{err}");
+    let (other, text, err) = judge(["out/b.mod", "out/a.mod"]);
+    assert!(other == code, "{text}{err}");
 }
 
 #[cfg(unix)]
