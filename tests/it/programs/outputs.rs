@@ -163,7 +163,7 @@ fn a_backup_is_read_by_tasks() {
         truegrind(at, &[&arguments[..], more].concat())
     };
     let (code, text, err) = judge("b", &["--together"]);
-    assert!(code < 2 && text.contains("Deviation of Work.mod"), "{text}{err}");
+    assert!(code < 2 && text.contains("PROGMOD/Work.mod"), "{text}{err}");
     let (code, _, err) = judge("b", &[]);
     assert!(code == 2 && err.contains("--together"), "{err}");
     // Two tasks that move are two arms, or an arm and something else.
