@@ -170,6 +170,9 @@ fn add_gram(a: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
 
 /// Adds to the covariance of a fit what an unknown scale error of the sensor, of standard deviation `sigma`, makes of its parameters: all
 /// readings that are too long by one share look like a larger arm. A fit that has a scale itself is left as it is.
+///
+/// With J the whitened Jacobian, Λ the prior precisions and s the derivatives of the readings by the scale, the estimate moves by
+/// (JᵀJ + Λ)⁻¹ Jᵀs for a scale of 1. That is not the covariance times Jᵀs: this may contain more, as what the arm lacks of uncertain causes.
 pub(crate) fn widen_by_scale(fitted: &mut Fitted, dataset: &Dataset, sigma: f64) {
     if fits_scale(fitted) {
         return;
@@ -177,8 +180,12 @@ pub(crate) fn widen_by_scale(fitted: &mut Fitted, dataset: &Dataset, sigma: f64)
     let readings = linearise_readings(fitted, dataset, &[]);
     let Some(covariance) = &mut fitted.estimate.covariance else { return };
     let arm = covariance.nrows();
-    let scale = readings.matrix.view((0, arm), (arm, 1)).into_owned();
-    let moved = &*covariance * scale * sigma;
+    let mut normal = readings.matrix.view((0, 0), (arm, arm)).into_owned();
+    for (k, prior) in fitted.priors.iter().enumerate() {
+        normal[(k, k)] += prior.sigma.powi(-2);
+    }
+    let Some((factor, _)) = factorise(&normal) else { return };
+    let moved = factor.solve(&readings.matrix.view((0, arm), (arm, 1)).column(0).into_owned()) * sigma;
     *covariance += &moved * moved.transpose();
 }
 
