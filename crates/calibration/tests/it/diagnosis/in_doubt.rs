@@ -15,7 +15,6 @@ use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::Confidence;
 use truegrind_calibration::identification::start::candidate_frames;
-use truegrind_calibration::measurement::dataset::Reading;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::import;
 use truegrind_calibration::measurement::simulation::recipe::Recipe;
