@@ -17,8 +17,17 @@ use truegrind_calibration::diagnosis::finding::Confidence;
 use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::import;
+use truegrind_calibration::measurement::simulation::Simulation;
 use truegrind_calibration::measurement::simulation::recipe::Recipe;
 use truegrind_math::se3::Pose;
+
+/// What a recipe simulates, and its rows.
+fn measured(recipe: &str) -> (Simulation, Dataset) {
+    let load = |name: &str| robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
+    let simulation = Recipe::parse(recipe, "case").unwrap().simulate(load).unwrap();
+    let rows = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
+    (simulation, rows)
+}
 
 /// An IRB 120 whose second joint yields and whose first gear is eccentric, measured by a tracker, and what was found of it.
 fn diagnosed(
@@ -39,9 +48,7 @@ fn diagnosed(
          reflector_mm = [38.2, 12.6, 61.3]\n[noise]\nsigma_mm = {noise_mm}\njoints_deg = 0.0005\n",
         0.6 * sine
     );
-    let load = |name: &str| truegrind_arm::robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
-    let simulation = Recipe::parse(&recipe, "case").unwrap().simulate(load).unwrap();
-    let rows = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
+    let (simulation, rows) = measured(&recipe);
     let frames = candidate_frames(&rows, &simulation.nominal).unwrap();
     let found = diagnose(&rows, "abb-irb-120", &simulation.nominal, &frames[0], &Options::default(), &|_| {})
         .unwrap();
@@ -219,9 +226,7 @@ reflector_mm = [38.2, 12.6, 61.3]
 sigma_mm = 0.012
 joints_deg = 0.0005
 "#;
-    let load = |name: &str| robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
-    let simulation = Recipe::parse(recipe, "case").unwrap().simulate(load).unwrap();
-    let rows = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
+    let (simulation, rows) = measured(recipe);
     let frames = candidate_frames(&rows, &simulation.nominal).unwrap();
     let found = diagnose(&rows, "abb-irb-120", &simulation.nominal, &frames[0], &Options::default(), &|_| {})
         .unwrap();
@@ -265,9 +270,7 @@ reflector_mm = [38.2, 12.6, 61.3]
 sigma_mm = 0.02
 joints_deg = 0.0005
 "#;
-    let load = |name: &str| robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
-    let simulation = Recipe::parse(recipe, "case").unwrap().simulate(load).unwrap();
-    let mut rows = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
+    let (simulation, mut rows) = measured(recipe);
     let last = rows.rows.len() as f64 - 1.0;
     for (i, row) in rows.rows.iter_mut().enumerate() {
         if let Reading::Position(at) = &mut row.reading {
