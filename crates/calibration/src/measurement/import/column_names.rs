@@ -10,3 +10,19 @@ pub(super) const READOUT: [&str; 3] = ["x", "y", "z"];
 
 /// The sampling point of a row on a path.
 pub(super) const PATH: [&str; 3] = ["path", "cycle", "sample"];
+
+/// Prefixes of joint names: `q1`, as here, or `J1`, as controllers show it.
+pub(super) const LETTERS: [char; 2] = ['q', 'J'];
+
+/// The joint that a header names.
+pub(super) fn joint(name: &str) -> Option<usize> {
+    LETTERS.into_iter().find_map(|letter| joint_number(name, letter))
+}
+
+/// The joint that a header names by this letter.
+pub(super) fn joint_number(name: &str, letter: char) -> Option<usize> {
+    let digits = name.strip_prefix(letter)?;
+    (digits.len() <= 2 && digits.bytes().all(|b| b.is_ascii_digit()))
+        .then(|| digits.parse().ok())?
+        .filter(|n| *n > 0)
+}

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::cell::{Line, Table};
-use super::column_names::{PATH, POSITION, QUATERNION, READOUT};
+use super::column_names::{LETTERS, PATH, POSITION, QUATERNION, READOUT, joint, joint_number};
 use super::error::{ImportError, Location};
 use super::stated_unit::{WithUnit, with_unit};
 use crate::measurement::dataset::Sensor;
@@ -139,7 +139,7 @@ impl HeaderColumns {
 /// A header without its unit. In another unit than the expected one a required column is an error, and an optional one keeps
 /// its header, so that it is not used.
 fn without_unit(header: String, location: &Location) -> Result<String, ImportError> {
-    match with_unit(&header, |name| joint(name).is_some()) {
+    match with_unit(&header) {
         None | Some(WithUnit { is_expected: false, is_required: false, .. }) => Ok(header),
         Some(WithUnit { name, is_expected: true, .. }) => Ok(name.to_owned()),
         Some(WithUnit { name, unit, expected, .. }) => Err(ImportError::Unusable {
@@ -227,8 +227,7 @@ pub(super) fn has_joints(table: &Table) -> bool {
 fn names_a_joint(line: &Line) -> bool {
     line.cells.iter().any(|cell| {
         let header = cell.to_string();
-        let name =
-            with_unit(&header, |name| joint(name).is_some()).map_or(header.as_str(), |stated| stated.name);
+        let name = with_unit(&header).map_or(header.as_str(), |stated| stated.name);
         joint(name).is_some()
     })
 }
@@ -291,9 +290,6 @@ const OPTIONAL: [&str; 13] = [
     "L",
 ];
 
-/// Prefixes of joint names: `q1`, as here, or `J1`, as controllers show it.
-const LETTERS: [char; 2] = ['q', 'J'];
-
 /// The prefix that a header uses; the first by default.
 fn joint_letter(found: &[String]) -> char {
     let names = |letter: char| {
@@ -308,18 +304,6 @@ pub(super) fn is_known(name: &str) -> bool {
         || POSITION.contains(&name)
         || QUATERNION.contains(&name)
         || READOUT.contains(&name)
-}
-
-/// The joint that a header names.
-pub(super) fn joint(name: &str) -> Option<usize> {
-    LETTERS.into_iter().find_map(|letter| joint_number(name, letter))
-}
-
-fn joint_number(name: &str, letter: char) -> Option<usize> {
-    let digits = name.strip_prefix(letter)?;
-    (digits.len() <= 2 && digits.bytes().all(|b| b.is_ascii_digit()))
-        .then(|| digits.parse().ok())?
-        .filter(|n| *n > 0)
 }
 
 /// Sentences on missing columns: each with a header that is probably meant for it, and all others in one.

@@ -13,8 +13,8 @@
 use nalgebra::{UnitQuaternion, UnitVector3, Vector3};
 
 use super::cell::{Cell, Line, Table};
-use super::column_names::{POSITION, QUATERNION};
-use super::columns::{is_known, joint};
+use super::column_names::{POSITION, QUATERNION, joint};
+use super::columns::is_known;
 use super::error::{ImportError, Location};
 
 /// A point with |x| + |y| + |z| below this was not measured (mm).

@@ -1,6 +1,6 @@
 //! Units that a header states behind the name: `q1 [deg]`, `measured_x (mm)`, `q1_deg`.
 
-use super::column_names::{POSITION, READOUT};
+use super::column_names::{POSITION, READOUT, joint};
 
 /// A header with a unit.
 #[derive(Debug, PartialEq, Eq)]
@@ -47,8 +47,8 @@ const UNITS: [&str; 26] = [
     "g",
 ];
 
-/// The name and unit of a header; `None` without a unit, or where no unit is expected of that column. `is_joint`: whether a name is a joint's.
-pub(super) fn with_unit(header: &str, is_joint: impl Fn(&str) -> bool) -> Option<WithUnit<'_>> {
+/// The name and unit of a header; `None` without a unit, or where no unit is expected of that column.
+pub(super) fn with_unit(header: &str) -> Option<WithUnit<'_>> {
     let in_brackets = ['[', '('].into_iter().zip([']', ')']).find_map(|(open, close)| {
         let (name, unit) = header.trim_end().strip_suffix(close)?.split_once(open)?;
         Some((name.trim_end(), unit.trim()))
@@ -66,7 +66,7 @@ pub(super) fn with_unit(header: &str, is_joint: impl Fn(&str) -> bool) -> Option
         "payload" => (false, &["kg"]),
         _ if READOUT.contains(&name) => (false, &MILLIMETRES),
         _ if name == "L" || POSITION.contains(&name) => (true, &MILLIMETRES),
-        _ if is_joint(name) => (true, &["deg", "degree", "degrees", "°"]),
+        _ if joint(name).is_some() => (true, &["deg", "degree", "degrees", "°"]),
         _ => return None,
     };
     let is_expected = accepted.iter().any(|one| one.to_lowercase() == unit.to_lowercase());
