@@ -53,7 +53,7 @@ pub enum Meaning {
 /// The names of the diagnosis. One name stands for several families: see [`meanings`].
 ///
 /// A name that is added to the diagnosis is added here, by what its sentence sends a technician to.
-pub const NAMES: [(&str, Family); 48] = [
+pub const NAMES: [(&str, Family); 49] = [
     ("link-geometry", Family::Geometry),
     ("joint-compliance", Family::Compliance),
     ("joint-stiffness", Family::Compliance),
@@ -65,6 +65,7 @@ pub const NAMES: [(&str, Family); 48] = [
     ("gear-two-joints", Family::Gear),
     ("gear-modulation", Family::Gear),
     ("gear-error", Family::Gear),
+    ("axis-wobble", Family::Gear),
     ("joint-coupling", Family::Gear),
     ("drive", Family::Gear),
     ("backlash", Family::Backlash),

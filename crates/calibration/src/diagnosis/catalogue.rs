@@ -501,13 +501,8 @@ fn base_tilts(nominal: &Model) -> Vec<(EmpiricalFault, f64)> {
         1 => [0, 2],
         _ => [0, 1],
     };
-    let (load, forms) = match nominal.bodies {
-        Some(_) => (
-            Overturning::Masses,
-            &[(None, false), (None, true), (Some(across), false), (Some(across), true)][..],
-        ),
-        None => (Overturning::Lumps, &[(None, false), (None, true), (Some(across), false)][..]),
-    };
+    let load = if nominal.bodies.is_some() { Overturning::Masses } else { Overturning::Lumps };
+    let forms = [(None, false), (None, true), (Some(across), false), (Some(across), true)];
     let tried = forms.len() as f64;
     forms.iter().map(|&(axes, deep)| (EmpiricalFault::BaseTilt { load, axes, deep }, tried)).collect()
 }
@@ -658,6 +653,8 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
         out.push((EmpiricalFault::CableReversal, 1.0));
     }
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
+    let wobble = |joint| [false, true].map(|radial| (EmpiricalFault::AxisWobble { joint, radial }, 2.0));
+    out.extend((0..6).filter(|&joint| moves(joint)).flat_map(wobble));
     let exact = out.len();
     out.push((EmpiricalFault::NonlinearStiffness { joint: 0, load: AssumedLoad::Masses }, 1.0));
     for joint in (1..5).filter(|&joint| moves(joint)) {

@@ -27,6 +27,8 @@ pub enum Part {
     Gear,
     /// Lost motion at reversals.
     Backlash,
+    /// Bearing.
+    Bearing,
 }
 
 /// Knots of a smooth error map over a turn.
@@ -59,6 +61,7 @@ impl Cause {
                     }
                     EmpiricalFault::LoadedPlay { .. } => CauseKind::Backlash,
                     EmpiricalFault::TwoJointGear { .. } => CauseKind::GearTwoJoints,
+                    EmpiricalFault::AxisWobble { .. } => CauseKind::AxisWobble,
                     EmpiricalFault::Refraction => CauseKind::AirRefraction,
                     EmpiricalFault::Pulley => CauseKind::CablePulley,
                     EmpiricalFault::Drum { .. } => CauseKind::CableDrum,
@@ -286,6 +289,10 @@ impl Cause {
                 kind: Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),
                 ..
             }) => Part::Backlash,
+            Cause::Measurement(Disturbance {
+                kind: Kind::Empirical(EmpiricalFault::AxisWobble { .. }),
+                ..
+            }) => Part::Bearing,
             Cause::Measurement(Disturbance {
                 kind:
                     Kind::Empirical(EmpiricalFault::NonlinearStiffness { .. } | EmpiricalFault::Hardening { .. }),

@@ -32,6 +32,8 @@ kinds! {
     AirRefraction = "air-refraction",
     /// Logged joint angles with too few digits.
     AngleRounding = "angle-rounding",
+    /// An axis that wobbles twice a turn.
+    AxisWobble = "axis-wobble",
     /// Lost motion where a joint reverses.
     Backlash = "backlash",
     /// A base that tilts under the overturning moment of the arm.

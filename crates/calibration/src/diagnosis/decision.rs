@@ -40,7 +40,7 @@ pub(super) fn family(effect: CauseKind) -> Option<Family> {
             Family::Arm
         }
         GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | JointZeroShift
-        | Backlash => Family::Drive,
+        | Backlash | AxisWobble => Family::Drive,
         SensorScale | SensorAxes | SensorRange | LensDistortion | CableSag | CablePulley | CableDrum
         | CableReversal | AirRefraction | TargetNest | TargetDroop => Family::Sensor,
         SensorZeroShift | SensorFrameShift | ToolShift | BaseTilt | PayloadChange | SetupChange => {
@@ -145,6 +145,10 @@ fn in_words(effect: CauseKind) -> Option<&'static str> {
         }
         JointStiffness => "measure the same ten poses with and without a load: what changes is the stiffness",
         PayloadChange => "weigh the tool, and measure the same ten poses with and without it",
+        AxisWobble => {
+            "turn this joint alone through its whole range, and read a target far from its axis and one near it at every ten degrees: what \
+             leaves the plane of the circle twice a turn is the bearing"
+        }
         GearTwoJoints | GearTransmission => {
             "turn each of these joints alone through its whole range in steps of a few degrees, and read at each: what returns with the angle \
              is the gear"

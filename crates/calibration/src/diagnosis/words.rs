@@ -322,6 +322,10 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
                 other + 1
             )
         }
+        EmpiricalFault::AxisWobble { .. } => format!(
+            "the axis of joint {joint} wobbles by up to {:.4}° twice a turn, as in a bearing with races that are not flat",
+            largest_tilt([0, 1, 2, 3].map(|k| value_of(parameters, k))).to_degrees()
+        ),
         EmpiricalFault::Refraction => format!(
             "the tracker's beam is refracted: {:.3} mm at 3 m, growing with the square of the distance, as in air with a vertical temperature gradient",
             9e3 * value.abs()
@@ -404,6 +408,12 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
     }
 }
 
+/// Largest tilt of an axis that tilts about x by a cos φ + b sin φ and about y by c cos φ + d sin φ: two circles, one that runs with φ and
+/// one against it.
+fn largest_tilt([a, b, c, d]: [f64; 4]) -> f64 {
+    0.5 * ((a + d).hypot(c - b) + (a - d).hypot(c + b))
+}
+
 /// The residual pattern that reveals a cause.
 pub fn describe_pattern(cause: &Cause) -> String {
     use CauseKind::*;
@@ -438,6 +448,9 @@ pub fn describe_pattern(cause: &Cause) -> String {
             format!("the residual about joint {joint} follows its torque, but not in proportion")
         }
         GearTwoJoints => format!("the residual about joint {joint} oscillates with the angles of two joints"),
+        AxisWobble => {
+            format!("the residual tilts about the axis of joint {joint} twice in a turn of it")
+        }
         AirRefraction => "the vertical residual grows with the square of the distance".to_owned(),
         CablePulley => "the residual follows the direction of the cable".to_owned(),
         CableDrum => "the residual follows powers of the cable's length".to_owned(),
@@ -554,6 +567,9 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         }
         GearTwoJoints => {
             "measure both joints over their whole range, one at a time and together; inspect the cable that crosses them"
+        }
+        AxisWobble => {
+            "inspect the bearing of this joint with a dial gauge, axially, over a whole turn; the written model leaves it out"
         }
         AirRefraction => {
             "measure at uniform air temperature and short distance, or with the tracker at the height of the arm"

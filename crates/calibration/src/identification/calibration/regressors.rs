@@ -216,7 +216,9 @@ pub fn sensor_shifts(
             }
             out
         }),
-        EmpiricalFault::TargetDroop { .. } | EmpiricalFault::BaseTilt { .. } => {
+        EmpiricalFault::TargetDroop { .. }
+        | EmpiricalFault::AxisWobble { .. }
+        | EmpiricalFault::BaseTilt { .. } => {
             let motions = sensor_motions(fault, dataset, model, frames);
             motions.iter().map(|rows| rows.iter().map(|[shift, _]| *shift).collect()).collect()
         }

@@ -1,4 +1,4 @@
-//! Motions of the sensor that stand for a target that droops and for a base that tilts: their regressors.
+//! Motions of the sensor that stand for a target that droops, an axis that wobbles and a base that tilts: their regressors.
 //!
 //! A target displaced by d and turned by ω is read as by a sensor that moved: by −d, if it reads no orientations. If it does, it turns by
 //! −ω too, and since that carries the target along, it moves by −d + ω × (p − s), p the target and s the sensor.
@@ -34,6 +34,15 @@ pub(super) fn sensor_motions(
             let here = droops(pole, turning, &offset, &(flange.inverse() * model.gravity));
             here.into_iter().map(|motion| motion.map(|v| flange * v)).collect()
         }),
+        EmpiricalFault::AxisWobble { joint, radial } => {
+            let posed = &posed;
+            Box::new(move |row, at, _| {
+                let frames = posed.frames(&row.joints);
+                let [z, across] = [frames.z[joint], frames.lateral[joint]].map(Vector3::from);
+                let angle = posed.joint_rotations(&row.joints)[joint];
+                wobbles(&z, &across, angle, radial, &(at - Vector3::from(frames.origin[joint])))
+            })
+        }
         EmpiricalFault::BaseTilt { load, axes, deep } => {
             let loads = Loads::of(load, model);
             Box::new(move |row, at, _| {
@@ -64,6 +73,26 @@ pub(super) fn sensor_motions(
         }
     }
     out
+}
+
+/// Motions of a target, at a lever from the origin of a joint's frame, per unit of each parameter of a wobble twice a turn: `z` is the joint's
+/// axis, `across` a direction that turns with it, `angle` its rotation. The tilt is about axes that stand still, so twice a turn there is
+/// once and three times a turn for who turns along.
+fn wobbles(
+    z: &Vector3<f64>,
+    across: &Vector3<f64>,
+    angle: f64,
+    radial: bool,
+    lever: &Vector3<f64>,
+) -> Vec<Motion> {
+    let (sin, cos) = angle.sin_cos();
+    let x = across * cos - z.cross(across) * sin;
+    let y = z.cross(&x);
+    let (sin, cos) = (2.0 * angle).sin_cos();
+    let directions = [x * cos, x * sin, y * cos, y * sin];
+    let tilts = directions.map(|turn| [turn.cross(lever), turn]);
+    let shifts = directions.map(|shift| [shift, Vector3::zeros()]);
+    tilts.into_iter().chain(shifts).take(if radial { 8 } else { 4 }).collect()
 }
 
 /// Motions of a target on its pole per unit of each parameter, in the flange's frame, without what a shift of the sensor does as well.

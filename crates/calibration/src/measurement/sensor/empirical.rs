@@ -87,6 +87,14 @@ pub enum EmpiricalFault {
         /// The multiples: of its own angle, of the other's.
         orders: [u8; 2],
     },
+    /// A joint (0-based) whose axis wobbles twice a turn, as in a bearing with races that are not flat: it tilts all that it carries, about two
+    /// axes across its own that stand still with the link before. Once a turn it would be a link that is not straight.
+    AxisWobble {
+        /// The joint.
+        joint: usize,
+        /// Whether it runs out too: the axis tilts about another point than the origin of its frame.
+        radial: bool,
+    },
     /// Refraction of a tracker's beam by a vertical temperature gradient: an error along gravity with the square of the distance,
     /// and its change with the height of the beam.
     Refraction,
@@ -164,7 +172,8 @@ impl EmpiricalFault {
         match self {
             EmpiricalFault::NonlinearStiffness { joint, .. }
             | EmpiricalFault::Hardening { joint, .. }
-            | EmpiricalFault::LoadedPlay { joint, .. } => vec![joint],
+            | EmpiricalFault::LoadedPlay { joint, .. }
+            | EmpiricalFault::AxisWobble { joint, .. } => vec![joint],
             EmpiricalFault::TwoJointGear { joint, other, .. } => vec![joint, other],
             _ => Vec::new(),
         }
@@ -178,13 +187,19 @@ impl EmpiricalFault {
                 | EmpiricalFault::Hardening { .. }
                 | EmpiricalFault::LoadedPlay { .. }
                 | EmpiricalFault::TwoJointGear { .. }
+                | EmpiricalFault::AxisWobble { .. }
                 | EmpiricalFault::BaseTilt { .. }
         )
     }
 
     /// Whether the sensor, if it reads orientations, sees it turn the target.
     pub fn turns_target(self) -> bool {
-        matches!(self, EmpiricalFault::TargetDroop { turning: true, .. } | EmpiricalFault::BaseTilt { .. })
+        matches!(
+            self,
+            EmpiricalFault::TargetDroop { turning: true, .. }
+                | EmpiricalFault::AxisWobble { .. }
+                | EmpiricalFault::BaseTilt { .. }
+        )
     }
 
     /// Whether it rotates joints; the others move the sensor.
@@ -262,6 +277,12 @@ impl EmpiricalFault {
                 ],
                 "rad",
             ),
+            EmpiricalFault::AxisWobble { radial, .. } => {
+                let mut out = listed(&["tilt x cos", "tilt x sin", "tilt y cos", "tilt y sin"], "rad");
+                let shifts = ["radial x cos", "radial x sin", "radial y cos", "radial y sin"];
+                out.extend(listed(if radial { &shifts } else { &[] }, "mm"));
+                out
+            }
             EmpiricalFault::Refraction => {
                 let mut out = listed(&["bend of the beam"], "1/m");
                 out.extend(listed(&["its change with height"], "1/m²"));
@@ -296,6 +317,14 @@ impl EmpiricalFault {
             EmpiricalFault::NonlinearStiffness { .. } => [1e-4, 1e-4][parameter.min(1)],
             EmpiricalFault::Hardening { .. } | EmpiricalFault::LoadedPlay { .. } => 0.2_f64.to_radians(),
             EmpiricalFault::TwoJointGear { .. } => 3e-4,
+            // The axial run-out of a crossed roller bearing, some 0.02 mm over its diameter of some 150 mm.
+            EmpiricalFault::AxisWobble { .. } => {
+                if parameter < 4 {
+                    1.5e-4
+                } else {
+                    0.02
+                }
+            }
             EmpiricalFault::Refraction => 5e-6,
             EmpiricalFault::Pulley | EmpiricalFault::Drum { .. } => 0.5,
             EmpiricalFault::Range { .. } | EmpiricalFault::CableReversal => 0.2,

@@ -456,6 +456,34 @@ fn a_target_that_droops_is_told_with_its_size() {
     assert!(found.estimated.model.effects.iter().all(Effect::is_zero), "it moves no program");
 }
 
+/// A bearing that lets its axis wobble: no gear, and no joint that another turns.
+#[test]
+fn an_axis_that_wobbles_is_told_with_its_joint_and_size() {
+    let hidden = [Hidden::Wobble { joint: 1, peak_rad: 3e-4 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 91)).dataset);
+    let names: Vec<_> = identified(&found).iter().map(|f| (f.effect.as_str(), f.joints.clone())).collect();
+    assert_eq!(names, [("axis-wobble", Some(vec![2]))]);
+    // The tilt runs round with the joint, from a direction that depends on the zero of the joint: one circle, and none against it.
+    let tilts = &identified(&found)[0].parameters[..4];
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k| tilts[k].value);
+    let sigma = tilts.iter().filter_map(|tilt| tilt.sigma).fold(0.0, f64::max);
+    let [with, against] = [(a + d).hypot(c - b), (a - d).hypot(c + b)].map(|both| 0.5 * both);
+    assert!((with - 3e-4).abs() < 4.0 * sigma && against < 4.0 * sigma, "{with} {against} {sigma}");
+    assert!(sigma < 2e-5, "{sigma}");
+    assert!(identified(&found)[0].cause.contains("wobbles by up to 0.01"), "{}", identified(&found)[0].cause);
+    assert!(found.estimated.model.effects.iter().all(Effect::is_zero), "it moves no program");
+}
+
+/// Over part of a turn a tilt about the next joint's axis is what a coupling of the two does: neither is said to be it.
+#[test]
+fn over_part_of_a_turn_a_wobbling_axis_may_be_a_coupling() {
+    let hidden = [Hidden::Wobble { joint: 2, peak_rad: 3e-4 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 91)).dataset);
+    assert!(identified(&found).is_empty());
+    let names: Vec<&str> = found.diagnosis.findings[0].members.iter().map(|m| m.effect.as_str()).collect();
+    assert!(names.contains(&"axis-wobble") && names.contains(&"joint-coupling"), "{names:?}");
+}
+
 /// A pedestal that tilts under the arm: no air, no axis of the sensor, no joint.
 #[test]
 fn a_base_that_tilts_is_told_with_its_size() {

@@ -329,6 +329,7 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         | Hidden::Reversal { .. }
         | Hidden::Lens { .. }
         | Hidden::Tilt { .. }
+        | Hidden::Wobble { .. }
         | Hidden::LoadedPlay { .. } => {
             return None;
         }

@@ -67,6 +67,11 @@ pub enum Hidden {
     Tilt {
         rad_per_nm: f64,
     },
+    /// The axis of a joint tilts by this, about a direction that turns twice while the joint turns once.
+    Wobble {
+        joint: usize,
+        peak_rad: f64,
+    },
     /// A tracker reads distances too long by this.
     Range {
         mm: f64,
@@ -150,6 +155,7 @@ impl Hidden {
             Hidden::Range { .. } => "sensor-range",
             Hidden::Droop { .. } => "target-droop",
             Hidden::Tilt { .. } => "base-tilt",
+            Hidden::Wobble { .. } => "axis-wobble",
             Hidden::Depth { .. } => "sensor-axes",
             Hidden::Gear { order, .. } if *order <= 2.0 => "gear-eccentricity",
             Hidden::Gear { .. } => "gear-transmission",
@@ -180,6 +186,7 @@ impl Hidden {
             | Hidden::Gear { joint, .. }
             | Hidden::Ratio { joint, .. }
             | Hidden::Backlash { joint, .. }
+            | Hidden::Wobble { joint, .. }
             | Hidden::LoadedPlay { joint, .. } => Some(vec![joint + 1]),
             Hidden::Coupling { driver, joint, .. } => Some(vec![driver + 1, joint + 1]),
             _ => None,
@@ -523,6 +530,12 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     Hidden::Droop { mm } => {
                         let pole = (frames[6] * grown.flange).column(2).xyz();
                         at -= (arm.up - pole * pole.dot(&arm.up)) * *mm;
+                    }
+                    Hidden::Wobble { joint, peak_rad } => {
+                        let [x, y, _, centre] = [0, 1, 2, 3].map(|k| frames[*joint].column(k).xyz());
+                        let (s, c) = (2.0 * u[*joint]).sin_cos();
+                        let tilt = nalgebra::Rotation3::new((x * c + y * s) * *peak_rad);
+                        at = centre + tilt * (at - centre);
                     }
                     Hidden::Tilt { rad_per_nm } => {
                         at = nalgebra::Rotation3::new(arm.overturning(&u) * *rad_per_nm) * at;

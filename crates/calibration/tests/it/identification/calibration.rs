@@ -136,6 +136,7 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
         EmpiricalFault::LoadedPlay { joint: 1, load: AssumedLoad::Frame(4) },
         EmpiricalFault::TwoJointGear { joint: 2, other: 3, orders: [1, 1] },
         EmpiricalFault::TwoJointGear { joint: 4, other: 5, orders: [2, 1] },
+        EmpiricalFault::AxisWobble { joint: 2, radial: true },
         EmpiricalFault::TargetDroop { pole: Pole::Axis, turning: true },
         EmpiricalFault::TargetDroop { pole: Pole::Offset, turning: false },
         EmpiricalFault::TargetDroop { pole: Pole::Bracket, turning: true },
@@ -273,7 +274,7 @@ fn every_column_has_a_numerical_twin() {
 /// What a target that droops and turns on its pole and a base that turns below its origin do to a reading, worked out without the
 /// regressors, leaves no residual but of second order.
 #[test]
-fn a_drooping_target_and_a_tilted_base_are_read_as_they_move() {
+fn a_drooping_target_a_wobbling_axis_and_a_tilted_base_are_read_as_they_move() {
     let arm = Model { effects: Vec::new(), ..arm() };
     let sensor_at = pose_from_vector(&[1500.0, -700.0, 300.0, 0.2, -0.3, 0.4]);
     let target_at = pose_from_vector(&[10.0, 20.0, 80.0, 0.1, -0.2, 0.05]);
@@ -288,9 +289,12 @@ fn a_drooping_target_and_a_tilted_base_are_read_as_they_move() {
         (droop, n.cross(&g) * (size * 20.0))
     };
     let tilt = EmpiricalFault::BaseTilt { load: Overturning::Masses, axes: None, deep: true };
-    let forms = [Pole::Axis, Pole::Offset].map(|pole| EmpiricalFault::TargetDroop { pole, turning: true });
+    let droops = [Pole::Axis, Pole::Offset].map(|pole| EmpiricalFault::TargetDroop { pole, turning: true });
+    let joint = 2;
+    let wobble = EmpiricalFault::AxisWobble { joint, radial: false };
+    let forms = [droops[0], droops[1], wobble, tilt];
     for (sensor, form) in
-        [Sensor::Position, Sensor::Pose].into_iter().flat_map(|s| [forms[0], forms[1], tilt].map(|f| (s, f)))
+        [Sensor::Position, Sensor::Pose].into_iter().flat_map(|s| forms.map(|form| (s, form)))
     {
         let mut data = dataset(sensor, 12, 8);
         let (mut values, mut shifted) = (vec![size * 1e3, size * 20.0], sensor_at);
@@ -308,6 +312,22 @@ fn a_drooping_target_and_a_tilted_base_are_read_as_they_move() {
                     seen.translation.vector += droop;
                     seen.rotation = UnitQuaternion::from_scaled_axis(turn) * seen.rotation;
                 }
+                EmpiricalFault::AxisWobble { .. } => {
+                    // The frame in which the joint turns: where it stands at the angle 0.
+                    let mut mapped = arm.joint_map * row.joints;
+                    let angle = std::mem::replace(&mut mapped[joint], 0.0);
+                    let stopped = arm.joint_map.try_inverse().unwrap() * mapped;
+                    let still = arm.at_condition(&Condition::default()).frames(&stopped);
+                    let [x, z] = [still.lateral[joint], still.z[joint]].map(Vector3::from);
+                    let y = z.cross(&x);
+                    let (s, c) = (2.0 * angle).sin_cos();
+                    let turn = (x * (c + 0.3 * s) + y * (0.5 * s - 0.2 * c)) * size;
+                    let centre = Pose::from_parts(
+                        Vector3::from(still.origin[joint]).into(),
+                        UnitQuaternion::identity(),
+                    );
+                    seen = centre * turned(turn) * centre.inverse() * seen;
+                }
                 _ => {
                     let moment = arm.statics().overturning_moment(&arm.mapped(&row.joints), &row.condition);
                     // About a place 400 mm below.
@@ -324,6 +344,7 @@ fn a_drooping_target_and_a_tilted_base_are_read_as_they_move() {
         match form {
             // What a droop does alike in all directions, a shift of the sensor does.
             EmpiricalFault::TargetDroop { .. } => shifted.translation.vector -= g * (size * 1e3),
+            EmpiricalFault::AxisWobble { .. } => values = [1.0, 0.3, -0.2, 0.5].map(|v| v * size).to_vec(),
             _ => values = vec![size, size * 400.0],
         }
         let mut fault = Disturbance::new(Kind::Empirical(form), Profile::Constant);
@@ -335,7 +356,7 @@ fn a_drooping_target_and_a_tilted_base_are_read_as_they_move() {
             ..Frames::at_origin(0)
         };
         let list: Vec<Parameter> =
-            (0..2).map(|parameter| Parameter::Disturbance { index: 0, parameter }).collect();
+            (0..values.len()).map(|parameter| Parameter::Disturbance { index: 0, parameter }).collect();
         let weights = [Weight { per_mm: 1.0, per_rad: 100.0 }; 12];
         let problem = CalibrationProblem::new(&data, &arm, &frames, &list, &[], &weights);
         let largest = |x: &[f64]| {
@@ -344,7 +365,8 @@ fn a_drooping_target_and_a_tilted_base_are_read_as_they_move() {
             out.iter().fold(0.0_f64, |most, r| most.max(r.abs()))
         };
         // The values are those of the start, and x is what they deviate by.
-        let (with, without) = (largest(&[0.0; 2]), largest(&values.iter().map(|v| -v).collect::<Vec<_>>()));
+        let (with, without) =
+            (largest(&vec![0.0; values.len()]), largest(&values.iter().map(|v| -v).collect::<Vec<_>>()));
         assert!(with < 1e-3 * without && without > 1e-4, "{sensor:?} {form:?}: {with:e} of {without:e}");
     }
 }
