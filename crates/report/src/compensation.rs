@@ -358,7 +358,7 @@ fn grouped(plan: &Plan) -> Vec<Group<'_>> {
         let group = &mut groups[index];
         group.outcomes.push(outcome);
         group.worst = match (group.worst, reason.and_then(|reason| reason.figure())) {
-            (Some(a), Some(b)) if b.value() > a.value() => Some(b),
+            (Some(a), Some(b)) if b.value > a.value => Some(b),
             (None, b) => b,
             (a, _) => a,
         };
