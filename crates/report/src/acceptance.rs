@@ -355,30 +355,22 @@ pub fn table(found: &Acceptance, sensor: Sensor) -> Table {
     let arms = [("data sheet, sensor registered", &found.nominal), ("estimated", &found.model)];
     let all =
         |of: fn(&ErrorSummary) -> f64| arms.iter().map(|(_, errors)| digits(of(errors))).max().unwrap_or(3);
-    Table::of(
-        "Errors",
-        &arms.map(|(arm, errors)| (arm, errors, Some(errors.mean).filter(|_| signed))),
-        [
-            (Column::text("arm", "Arm"), |(arm, ..)| (*arm).into()),
-            (Column::number("rmse_mm", "RMSE", "mm", all(|errors| errors.rmse)), |(_, errors, _)| {
-                errors.rmse.into()
-            }),
-            (
-                Column::number("mean_absolute_mm", "mean |e|", "mm", all(|errors| errors.mean_absolute)),
-                |(_, errors, _)| errors.mean_absolute.into(),
-            ),
-            (
-                Column::number("standard_deviation_mm", "SD", "mm", all(|errors| errors.standard_deviation)),
-                |(_, errors, _)| errors.standard_deviation.into(),
-            ),
-            (Column::number("max_mm", "max", "mm", all(|errors| errors.max)), |(_, errors, _)| {
-                errors.max.into()
-            }),
-            (Column::number("mean_mm", "signed mean", "mm", all(|errors| errors.mean)), |(.., mean)| {
-                (*mean).into()
-            }),
-        ],
-    )
+    Table::of("Errors", &arms.map(|(arm, errors)| (arm, errors, Some(errors.mean).filter(|_| signed))))
+        .text("arm", "Arm", |(arm, ..)| *arm)
+        .number("rmse_mm", "RMSE", "mm", all(|errors| errors.rmse), |(_, errors, _)| errors.rmse)
+        .number("mean_absolute_mm", "mean |e|", "mm", all(|errors| errors.mean_absolute), |(_, errors, _)| {
+            errors.mean_absolute
+        })
+        .number(
+            "standard_deviation_mm",
+            "SD",
+            "mm",
+            all(|errors| errors.standard_deviation),
+            |(_, errors, _)| errors.standard_deviation,
+        )
+        .number("max_mm", "max", "mm", all(|errors| errors.max), |(_, errors, _)| errors.max)
+        .number("mean_mm", "signed mean", "mm", all(|errors| errors.mean), |(.., mean)| *mean)
+        .table()
 }
 
 /// Orientation errors and the decision on them.
@@ -522,28 +514,20 @@ fn iso_of_path(found: &PathFound, table: &mut Table) {
 }
 
 fn conditions(found: &Acceptance, estimated: &Estimated) -> Table {
-    let mut table = Table::new(
-        "",
-        vec![
-            Column::text("quantity", "Quantity"),
-            Column::text("unit", "Unit"),
-            Column::significant("least", "From", "", 4),
-            Column::significant("most", "To", "", 4),
-            Column::significant("model", "Of the model (median)", "", 4),
-        ],
-    );
     let condition = &estimated.condition;
-    let rows = [
+    let quantities = [
         ("time (warm-up)", "h", condition.time_h),
         ("temperature", "°C", condition.temperature_c),
         ("payload", "kg", condition.payload_kg),
     ];
-    for ((name, unit, model), range) in rows.into_iter().zip(found.conditions) {
-        let [least, most] = [0, 1].map(|k| Cell::from(range.map(|range| range[k])));
-        table.push([name.into(), unit.into(), least, most, model.into()]);
-    }
-    table.notes.push("–: not logged; what the model depends on is then taken as in its own rows.".to_owned());
-    table
+    Table::of("", quantities.into_iter().zip(found.conditions))
+        .text("quantity", "Quantity", |((name, ..), _)| *name)
+        .text("unit", "Unit", |((_, unit, _), _)| *unit)
+        .significant("least", "From", "", 4, |(_, range)| range.map(|range| range[0]))
+        .significant("most", "To", "", 4, |(_, range)| range.map(|range| range[1]))
+        .significant("model", "Of the model (median)", "", 4, |((.., model), _)| *model)
+        .note("–: not logged; what the model depends on is then taken as in its own rows.")
+        .table()
 }
 
 fn method(found: &Acceptance, statement: &Statement) -> Vec<String> {

@@ -10,7 +10,7 @@ use super::document::{Document, KeyFigure, PageVerdict};
 use super::kept;
 use super::placement::{self, Placed};
 use super::status::Status;
-use super::table::{Cell, Column, Table};
+use super::table::{Cell, Table};
 use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::frames::undeclared::undeclared;
 use truegrind_compensation::plan::Plan;
@@ -266,29 +266,23 @@ fn worst_first(rows: &[Row]) -> Vec<Row> {
 
 /// One row per program.
 pub fn table(rows: &[Row]) -> Table {
-    Table::of(
-        "Programs",
-        rows,
-        [
-            (Column::text("file", "Program"), |row| row.file.as_str().into()),
-            (Column::text("status", "Status"), |row| Cell::Judged(row.judged(), row.ended.text().to_owned())),
-            (Column::count("motions", "Motions"), |row| row.motions[0].into()),
-            (Column::count("changed", "Changed"), |row| row.motions[1].into()),
-            (Column::count("flagged", "Flagged"), |row| row.motions[2].into()),
-            (Column::count("refused", "Refused"), |row| row.motions[3].into()),
-            (Column::count("left", "Left"), |row| row.motions[4].into()),
-            (Column::number("covered_percent", "Covered", "%", 1), |row| row.covered_percent().into()),
-            (Column::number("before_mm", "largest before", "mm", 3), |row| row.before_mm.into()),
-            (Column::number("after_mm", "largest remainder", "mm", 4), |row| row.after_mm.into()),
-            (Column::number("expected_mm", "expected after", "mm", 3), |row| row.expected_mm.into()),
-            (Column::text("figures", "Figures"), |row| {
-                row.shape_only.then(|| "shape only".to_owned()).into()
-            }),
-            (Column::count("opaque", "Not read"), |row| row.opaque.into()),
-            (Column::text("output", "Written to"), |row| row.output.clone().into()),
-            (Column::text("note", "Note"), |row| row.remark().into()),
-        ],
-    )
+    Table::of("Programs", rows)
+        .text("file", "Program", |row| row.file.as_str())
+        .text("status", "Status", |row| Cell::Judged(row.judged(), row.ended.text().to_owned()))
+        .count("motions", "Motions", |row| row.motions[0])
+        .count("changed", "Changed", |row| row.motions[1])
+        .count("flagged", "Flagged", |row| row.motions[2])
+        .count("refused", "Refused", |row| row.motions[3])
+        .count("left", "Left", |row| row.motions[4])
+        .number("covered_percent", "Covered", "%", 1, |row| row.covered_percent())
+        .number("before_mm", "largest before", "mm", 3, |row| row.before_mm)
+        .number("after_mm", "largest remainder", "mm", 4, |row| row.after_mm)
+        .number("expected_mm", "expected after", "mm", 3, |row| row.expected_mm)
+        .text("figures", "Figures", |row| row.shape_only.then(|| "shape only".to_owned()))
+        .count("opaque", "Not read", |row| row.opaque)
+        .text("output", "Written to", |row| row.output.clone())
+        .text("note", "Note", |row| row.remark())
+        .table()
 }
 
 /// Totals of all rows as a sentence.

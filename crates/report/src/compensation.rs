@@ -116,26 +116,13 @@ fn largest_deviations(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> 
 
 /// Reasons why motions were left, refused or flagged, with counts and first lines; most frequent first within each status.
 pub fn reason_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
-    let mut table = Table::new(
-        "Reasons",
-        vec![
-            Column::text("status", "Status"),
-            Column::count("motions", "Motions"),
-            Column::text("reason", "Reason"),
-            Column::text("worst", "Worst"),
-            Column::text("lines", "Lines"),
-        ],
-    );
-    for group in grouped(plan) {
-        table.push([
-            status_cell(group.status),
-            group.outcomes.len().into(),
-            with_causes(&group).into(),
-            group.worst.map(|figure| figure.to_string()).into(),
-            lines(&group.outcomes, listing, files).into(),
-        ]);
-    }
-    table
+    Table::of("Reasons", grouped(plan))
+        .text("status", "Status", |group| status_cell(group.status))
+        .count("motions", "Motions", |group| group.outcomes.len())
+        .text("reason", "Reason", with_causes)
+        .text("worst", "Worst", |group| group.worst.map(|figure| figure.to_string()))
+        .text("lines", "Lines", |group| lines(&group.outcomes, listing, files))
+        .table()
 }
 
 /// JSON report, schema `truegrind.compensation/1`. `output` is `null` if nothing was written.
@@ -281,18 +268,11 @@ fn heading(plan: &Plan, files: &[ProgramFile]) -> Document {
 
 /// Regions that could not be read.
 pub fn opaque_table(listing: &Listing, files: &[ProgramFile]) -> Table {
-    let mut table = Table::new(
-        "Not read, left unchanged",
-        vec![Column::text("file", "File"), Column::count("line", "Line"), Column::text("reason", "Reason")],
-    );
-    for region in &listing.opaque {
-        table.push([
-            file_name(files, region.place).into(),
-            Cell::Count(u64::from(region.place.line)),
-            region.reason.text().into(),
-        ]);
-    }
-    table
+    Table::of("Not read, left unchanged", &listing.opaque)
+        .text("file", "File", |region| file_name(files, region.place))
+        .count("line", "Line", |region| region.place.line as usize)
+        .text("reason", "Reason", |region| region.reason.text())
+        .table()
 }
 
 fn motion<'a>(outcome: &MotionOutcome, listing: &'a Listing) -> (Place, &'a str) {
@@ -358,7 +338,7 @@ fn grouped(plan: &Plan) -> Vec<Group<'_>> {
         let group = &mut groups[index];
         group.outcomes.push(outcome);
         group.worst = match (group.worst, reason.and_then(|reason| reason.figure())) {
-            (Some(a), Some(b)) if b.value() > a.value() => Some(b),
+            (Some(a), Some(b)) if b.value > a.value => Some(b),
             (None, b) => b,
             (a, _) => a,
         };

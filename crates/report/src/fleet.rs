@@ -11,7 +11,7 @@ use super::diagnosis;
 use super::document::{Document, KeyFigure, PageVerdict};
 use super::kept;
 use super::status::Status;
-use super::table::{Cell, Column, Table};
+use super::table::{Cell, Table};
 use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::diagnose::Diagnosed;
 use truegrind_calibration::diagnosis::finding::{Confidence, NoiseFloorSource};
@@ -175,41 +175,29 @@ pub fn ranks(rows: &[Row]) -> Vec<Option<usize>> {
 /// One row per arm, in the order of the rows.
 pub fn table(rows: &[Row]) -> Table {
     let ranked: Vec<(&Row, Option<usize>)> = rows.iter().zip(ranks(rows)).collect();
-    let mut table = Table::of(
-        "Arms",
-        &ranked,
-        [
-            (Column::count("rank", "Rank"), |(_, rank)| (*rank).into()),
-            (Column::text("file", "Measurements"), |(row, _)| row.file.as_str().into()),
-            (Column::text("status", "Status"), |(row, _)| Cell::Judged(row.judged(), row.status_text())),
-            (Column::text("robot", "Robot"), |(row, _)| row.robot.clone().into()),
-            (Column::count("rows", "Rows"), |(row, _)| (!row.failed).then_some(row.rows).into()),
-            (Column::number("nominal_mm", "Data sheet", "mm", 3), |(row, _)| row.nominal_mm.into()),
-            (Column::number("geometric_mm", "Geometry", "mm", 3), |(row, _)| row.geometric_mm.into()),
-            (Column::number("extended_mm", "All causes found", "mm", 3), |(row, _)| row.extended_mm.into()),
-            (Column::number("written_mm", "Written model", "mm", 3), |(row, _)| row.written_mm.into()),
-            (Column::number("to_gain_mm", "Gain", "mm", 3), |(row, _)| row.to_gain_mm().into()),
-            (Column::number("noise_floor_mm", "Noise floor", "mm", 3), |(row, _)| row.noise_floor_mm.into()),
-            (Column::text("largest_cause", "Largest cause"), |(row, _)| {
-                row.largest().map(|cause| cause.effect.as_str()).into()
-            }),
-            (Column::text("largest_place", "Where"), |(row, _)| {
-                row.largest().map(|cause| cause.place.as_str()).into()
-            }),
-            (Column::number("largest_worth_mm", "Its size", "mm", 3), |(row, _)| {
-                row.largest().and_then(|cause| cause.worth_mm).into()
-            }),
-            (Column::text("causes", "All causes"), |(row, _)| row.all_causes().into()),
-            (Column::text("output", "Model"), |(row, _)| row.output.clone().into()),
-            (Column::text("note", "Note"), |(row, _)| row.note.clone().into()),
-        ],
-    );
-    table.notes.push(
-        "Errors are held out (five random folds). Gain: error of the data sheet minus that of the written model, which has none of the causes that are not \
-         certain; arms are ranked by it. Its size: change of the readings by the cause, RMS over all rows."
-            .to_owned(),
-    );
-    table
+    Table::of("Arms", &ranked)
+        .count("rank", "Rank", |(_, rank)| *rank)
+        .text("file", "Measurements", |(row, _)| row.file.as_str())
+        .text("status", "Status", |(row, _)| Cell::Judged(row.judged(), row.status_text()))
+        .text("robot", "Robot", |(row, _)| row.robot.clone())
+        .count("rows", "Rows", |(row, _)| (!row.failed).then_some(row.rows))
+        .number("nominal_mm", "Data sheet", "mm", 3, |(row, _)| row.nominal_mm)
+        .number("geometric_mm", "Geometry", "mm", 3, |(row, _)| row.geometric_mm)
+        .number("extended_mm", "All causes found", "mm", 3, |(row, _)| row.extended_mm)
+        .number("written_mm", "Written model", "mm", 3, |(row, _)| row.written_mm)
+        .number("to_gain_mm", "Gain", "mm", 3, |(row, _)| row.to_gain_mm())
+        .number("noise_floor_mm", "Noise floor", "mm", 3, |(row, _)| row.noise_floor_mm)
+        .text("largest_cause", "Largest cause", |(row, _)| row.largest().map(|cause| cause.effect.as_str()))
+        .text("largest_place", "Where", |(row, _)| row.largest().map(|cause| cause.place.as_str()))
+        .number("largest_worth_mm", "Its size", "mm", 3, |(row, _)| {
+            row.largest().and_then(|cause| cause.worth_mm)
+        })
+        .text("causes", "All causes", |(row, _)| row.all_causes())
+        .text("output", "Model", |(row, _)| row.output.clone())
+        .text("note", "Note", |(row, _)| row.note.clone())
+.note("Errors are held out (five random folds). Gain: error of the data sheet minus that of the written model, which has none of the causes that are not \
+         certain; arms are ranked by it. Its size: change of the readings by the cause, RMS over all rows.")
+.table()
 }
 
 /// Causes over all arms, with their number and size.
@@ -227,30 +215,21 @@ pub fn cause_table(rows: &[Row]) -> Table {
     };
     let mut found: Vec<_> = found.into_iter().collect();
     found.sort_by_key(|(_, of)| std::cmp::Reverse(arms(of)));
-    let mut table = Table::new(
-        "Causes over all arms",
-        vec![
-            Column::text("cause", "Cause"),
-            Column::count("arms", "Arms"),
-            Column::count("identified", "Identified at"),
-            Column::number("largest_mm", "Largest", "mm", 3),
-            Column::text("at", "Largest at"),
-            Column::text("remedy", "What to do"),
-        ],
-    );
-    for (effect, of) in found {
-        let size = |cause: &Cause| cause.worth_mm.unwrap_or(0.0);
-        let Some((at, largest)) = of.iter().max_by(|a, b| size(a.1).total_cmp(&size(b.1))) else { continue };
-        table.push([
-            effect.words().into(),
-            arms(&of).into(),
-            arms(&of.iter().copied().filter(|(_, cause)| cause.identified).collect::<Vec<_>>()).into(),
-            largest.worth_mm.into(),
-            format!("{}, {}", at.file, largest.place).into(),
-            largest.remedy.as_str().into(),
-        ]);
-    }
-    table
+    let size = |cause: &Cause| cause.worth_mm.unwrap_or(0.0);
+    let largest = found.into_iter().filter_map(|(effect, of)| {
+        let largest = of.iter().copied().max_by(|a, b| size(a.1).total_cmp(&size(b.1)))?;
+        Some((effect, of, largest))
+    });
+    Table::of("Causes over all arms", largest)
+        .text("cause", "Cause", |(effect, ..)| effect.words())
+        .count("arms", "Arms", |(_, of, _)| arms(of))
+        .count("identified", "Identified at", |(_, of, _)| {
+            arms(&of.iter().copied().filter(|(_, cause)| cause.identified).collect::<Vec<_>>())
+        })
+        .number("largest_mm", "Largest", "mm", 3, |(.., (_, largest))| largest.worth_mm)
+        .text("at", "Largest at", |(.., (at, largest))| format!("{}, {}", at.file, largest.place))
+        .text("remedy", "What to do", |(.., (_, largest))| largest.remedy.as_str())
+        .table()
 }
 
 /// Rows of the table on a terminal or page; the CSV file has all.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::table::{Column, Table};
+use super::table::Table;
 use truegrind_calibration::identification::verdict::{MAX_PERCENT, MIN_PERCENT, percent_of};
 use truegrind_compensation::line_list::numbered;
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -236,19 +236,16 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
     let mut order: Vec<&CutRisk> = plan.cuts.iter().collect();
     order.sort_by(|a, b| b.probability_of_harm.total_cmp(&a.probability_of_harm));
     let rows = order.iter().take(MAX_LISTED).map(|cut| (*cut, lines(cut, listing)));
-    let mut table = Table::of(
-        "Cuts by the probability that the correction makes them worse",
-        &rows.collect::<Vec<_>>(),
-        [
-            (Column::text("lines", "Lines"), |(_, lines)| lines.as_str().into()),
-            (Column::count("motions", "Motions"), |(cut, _)| cut.motions.len().into()),
-            (Column::text("judged", "Judged"), |(cut, _)| word(cut.assessed).into()),
-            (Column::number("off_mm", "before", "mm", 3), |(cut, _)| cut.deviation_mm.into()),
-            (Column::number("sigma_mm", "1σ", "mm", 3), |(cut, _)| cut.sigma_mm.into()),
-            (Column::text("worse_percent", "worse"), |(cut, _)| percent_of(cut.probability_of_harm).into()),
-            (Column::text("fate", "Outcome"), |(cut, _)| outcome_word(cut).into()),
-        ],
-    );
+    let mut table =
+        Table::of("Cuts by the probability that the correction makes them worse", &rows.collect::<Vec<_>>())
+            .text("lines", "Lines", |(_, lines)| lines.as_str())
+            .count("motions", "Motions", |(cut, _)| cut.motions.len())
+            .text("judged", "Judged", |(cut, _)| word(cut.assessed))
+            .number("off_mm", "before", "mm", 3, |(cut, _)| cut.deviation_mm)
+            .number("sigma_mm", "1σ", "mm", 3, |(cut, _)| cut.sigma_mm)
+            .text("worse_percent", "worse", |(cut, _)| percent_of(cut.probability_of_harm))
+            .text("fate", "Outcome", |(cut, _)| outcome_word(cut))
+            .table();
     let more = order.len().saturating_sub(MAX_LISTED);
     if more > 0 {
         table.notes.push(format!("{more} more cuts with a smaller probability are not listed."));

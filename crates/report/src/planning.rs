@@ -71,30 +71,22 @@ fn plan_reading(plan: &Plan, setup: &MeasurementSetup<'_>) -> Option<Reading> {
 
 /// Every effect with its smallest detectable size.
 pub fn effect_table(plan: &Plan) -> Table {
-    let mut table = Table::of(
-        "Detectable effects",
-        &plan.detectability,
-        [
-            (Column::text("effect", "Effect"), |found| found.effect.as_str().into()),
-            (Column::text("which", "Which"), |found| found.which.as_str().into()),
-            (Column::significant("smallest", "Smallest size", "", 2), |found| found.smallest.into()),
-            (Column::text("unit", "Unit"), |found| found.unit.into()),
-            (Column::significant("shows", "Shows as", "", 2), |found| found.shows.into()),
-            (Column::text("shows_unit", "Unit"), |found| found.shows_unit.into()),
-            (Column::significant("usual", "Usual size", "", 2), |found| found.usual.into()),
-            (Column::text("decided", "Detectable"), judged),
-        ],
-    );
-    table.notes.push(
-        "Smallest size: size at which the non-centrality, with geometry and frames free, reaches --decisive in the worst phase or \
+    Table::of("Detectable effects", &plan.detectability)
+        .text("effect", "Effect", |found| found.effect.as_str())
+        .text("which", "Which", |found| found.which.as_str())
+        .significant("smallest", "Smallest size", "", 2, |found| found.smallest)
+        .text("unit", "Unit", |found| found.unit)
+        .significant("shows", "Shows as", "", 2, |found| found.shows)
+        .text("shows_unit", "Unit", |found| found.shows_unit)
+        .significant("usual", "Usual size", "", 2, |found| found.usual)
+        .text("decided", "Detectable", |found| judged(found))
+.note("Smallest size: size at which the non-centrality, with geometry and frames free, reaches --decisive in the worst phase or \
          direction. Shows as: its largest effect in a joint or at the sensor. Usual size: a small practical value in the same \
          unit. Shifts are assumed in the middle of the run; a shift near its end must be larger. At its smallest size an effect is reported in \
          about three of four measurements with a tracker, and in about half with one cable, by its own name or as one of several that look alike in \
          these poses; to be identified it may have to be twice as large, and more where another effect looks alike: with one cable, a compliance or \
-         a gear ratio at twice the size was identified in 3 of 24."
-            .to_owned(),
-    );
-    table
+         a gear ratio at twice the size was identified in 3 of 24.")
+.table()
 }
 
 fn judged(found: &Detectability) -> Cell {
@@ -109,24 +101,16 @@ fn judged(found: &Detectability) -> Cell {
 
 /// Predicted standard deviation of every parameter.
 pub fn sigma_table(plan: &Plan) -> Table {
-    let mut table = Table::new(
-        "Predicted uncertainty of every parameter",
-        vec![
-            Column::text("parameter", "Parameter"),
-            Column::significant("sigma", "Predicted 1σ", "", 2),
-            Column::text("unit", "Unit"),
-        ],
-    );
-    for (parameter, sigma) in plan.parameters.iter().zip(&plan.sigmas) {
-        let angle = parameter.is_angle();
-        let (value, unit) = if angle { (sigma.to_degrees(), "°") } else { (*sigma, "mm") };
-        table.push([parameter.to_string().into(), value.into(), unit.into()]);
-    }
-    table.notes.push(
-        "Including the prior tolerances of arm and frames. Unidentifiable parameters keep their tolerance."
-            .to_owned(),
-    );
-    table
+    Table::of("Predicted uncertainty of every parameter", plan.parameters.iter().zip(&plan.sigmas))
+        .text("parameter", "Parameter", |(parameter, _)| parameter.to_string())
+        .significant("sigma", "Predicted 1σ", "", 2, |(parameter, sigma)| {
+            if parameter.is_angle() { sigma.to_degrees() } else { **sigma }
+        })
+        .text("unit", "Unit", |(parameter, _)| if parameter.is_angle() { "°" } else { "mm" })
+        .note(
+            "Including the prior tolerances of arm and frames. Unidentifiable parameters keep their tolerance.",
+        )
+        .table()
 }
 
 fn rows_of(plan: &Plan, purpose: Purpose) -> usize {
@@ -261,33 +245,26 @@ fn named(cause: &CandidateCause) -> String {
 
 /// How far the rows part each finding in question and its rivals.
 pub fn parting_table(plan: &Plan) -> Table {
-    let mut table = Table::of(
-        "Findings in question",
-        &plan.partings,
-        [
-            (Column::text("finding", "Finding"), |parting| named(&parting.finding).into()),
-            (Column::text("alike", "Most alike"), |parting| {
-                parting.alike.each_ref().map(named).join(" and ").into()
-            }),
-            (Column::significant("lambda", "λ", "", 2), |parting| parting.lambda.into()),
-            (Column::significant("lambda_alone", "λ without rivals", "", 2), |parting| parting.alone.into()),
-            (Column::significant("lambda_with_load", "λ with a load", "", 2), |parting| {
-                parting.with_load.map(|load| load.lambda).into()
-            }),
-            (Column::text("decides", "Will decide"), |parting| {
-                if parting.decides() {
-                    Cell::Judged(Status::Good, "probably".to_owned())
-                } else {
-                    Cell::Judged(Status::Warning, "probably not".to_owned())
-                }
-            }),
-        ],
-    );
-    table.notes.push(format!(
+    Table::of("Findings in question", &plan.partings)
+        .text("finding", "Finding", |parting| named(&parting.finding))
+        .text("alike", "Most alike", |parting| parting.alike.each_ref().map(named).join(" and "))
+        .significant("lambda", "λ", "", 2, |parting| parting.lambda)
+        .significant("lambda_alone", "λ without rivals", "", 2, |parting| parting.alone)
+        .significant("lambda_with_load", "λ with a load", "", 2, |parting| {
+            parting.with_load.map(|load| load.lambda)
+        })
+        .text("decides", "Will decide", |parting| {
+            if parting.decides() {
+                Cell::Judged(Status::Good, "probably".to_owned())
+            } else {
+                Cell::Judged(Status::Warning, "probably not".to_owned())
+            }
+        })
+.note(format!(
         "λ: non-centrality with which these rows tell the two causes that are most alike from each other, at the size of the finding, geometry and \
          frames free; from {DECIDES:.0} on they probably decide. With a load: the rated one, on the flange in every second row."
-    ));
-    table
+    ))
+.table()
 }
 
 /// Says that a target on the axis of joint 6 shows nothing of that joint.

@@ -6,7 +6,7 @@ use super::document::{Block, Document, Figure, KeyFigure, PageVerdict};
 use super::number::MISSING;
 use super::plot::{Axis, PlanPath, PlanView};
 use super::status::Status;
-use super::table::{Cell, Column, Table};
+use super::table::{Cell, Table};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::link::LinkModel;
 use truegrind_arm::model::Joints;
@@ -17,82 +17,56 @@ use truegrind_arm::robots::validation;
 
 /// Name, maker, designation, rated load, reach, repeatability and program language of each arm.
 pub fn catalogue_table(robots: &[Robot]) -> Table {
-    Table::of(
-        "Robot arms",
-        robots,
-        [
-            (Column::text("name", "Name"), |robot| robot.sheet.name.as_str().into()),
-            (Column::text("maker", "Maker"), |robot| words(&robot.sheet.maker)),
-            (Column::text("model", "Model"), |robot| words(&robot.sheet.model)),
-            (Column::significant("payload_kg", "Payload", "kg", 3), |robot| robot.sheet.payload_kg.into()),
-            (Column::number("reach_mm", "Reach", "mm", 0), |robot| robot.sheet.reach_mm.into()),
-            (Column::number("repeatability_mm", "Repeatability", "mm", 3), |robot| {
-                robot.sheet.repeatability_mm.into()
-            }),
-            (Column::text("dialect", "Programs"), |robot| robot.sheet.dialect.map(dialect).into()),
-        ],
-    )
+    Table::of("Robot arms", robots)
+        .text("name", "Name", |robot| robot.sheet.name.as_str())
+        .text("maker", "Maker", |robot| words(&robot.sheet.maker))
+        .text("model", "Model", |robot| words(&robot.sheet.model))
+        .significant("payload_kg", "Payload", "kg", 3, |robot| robot.sheet.payload_kg)
+        .number("reach_mm", "Reach", "mm", 0, |robot| robot.sheet.reach_mm)
+        .number("repeatability_mm", "Repeatability", "mm", 3, |robot| robot.sheet.repeatability_mm)
+        .text("dialect", "Programs", |robot| robot.sheet.dialect.map(dialect))
+        .table()
 }
 
 /// The links with their nominal parameters in mm and degrees.
 pub fn link_table(robot: &Robot) -> Table {
     let hayati = robot.sheet.link.iter().any(|link| link.model == LinkModel::Hayati);
-    let mut columns = vec![
-        Column::count("link", "Link"),
-        Column::text("model", "Model"),
-        Column::number("a_mm", "a", "mm", 3),
-        Column::number("d_mm", "d", "mm", 3),
-        Column::number("alpha_deg", "α", "°", 3),
-        Column::number("theta_deg", "θ offset", "°", 3),
-    ];
-    if hayati {
-        columns.push(Column::number("beta_deg", "β", "°", 3));
-    }
-    let mut table = Table::new("Links", columns);
-    for (index, link) in robot.sheet.link.iter().enumerate() {
-        let (model, beta) = match link.model {
-            LinkModel::Dh => ("DH", Cell::Missing),
-            LinkModel::Hayati => ("Hayati", link.beta_deg.into()),
-        };
-        table.push([
-            (index + 1).into(),
-            model.into(),
-            link.a_mm.into(),
-            link.d_mm.into(),
-            link.alpha_deg.into(),
-            link.theta_deg.into(),
-            beta,
-        ]);
-    }
-    table.notes.push(
-        "T = Rz(θ) Tz(d) Tx(a) Rx(α) from each frame to the next (ltlm-2024 eq. 2); θ is the joint angle plus the offset."
-            .to_owned(),
-    );
-    if hayati {
-        table.notes.push(
-            "Hayati links end in Ry(β): their next axis is nominally parallel, and d is constant and not identified."
-                .to_owned(),
+    let mut table = Table::of("Links", robot.sheet.link.iter().enumerate())
+        .count("link", "Link", |(index, _)| index + 1)
+        .text("model", "Model", |(_, link)| match link.model {
+            LinkModel::Dh => "DH",
+            LinkModel::Hayati => "Hayati",
+        })
+        .number("a_mm", "a", "mm", 3, |(_, link)| link.a_mm)
+        .number("d_mm", "d", "mm", 3, |(_, link)| link.d_mm)
+        .number("alpha_deg", "α", "°", 3, |(_, link)| link.alpha_deg)
+        .number("theta_deg", "θ offset", "°", 3, |(_, link)| link.theta_deg)
+        .note(
+            "T = Rz(θ) Tz(d) Tx(a) Rx(α) from each frame to the next (ltlm-2024 eq. 2); θ is the joint angle plus the offset.",
         );
+    if hayati {
+        table = table
+            .number("beta_deg", "β", "°", 3, |(_, link)| match link.model {
+                LinkModel::Dh => None,
+                LinkModel::Hayati => Some(link.beta_deg),
+            })
+            .note(
+                "Hayati links end in Ry(β): their next axis is nominally parallel, and d is constant and not identified.",
+            );
     }
-    table
+    table.table()
 }
 
 /// Ranges and speeds of the joints in controller angles.
 pub fn joint_table(robot: &Robot) -> Table {
     let joints = &robot.sheet.joints;
-    let mut table = Table::new(
-        "Joints",
-        vec![
-            Column::count("joint", "Joint"),
-            Column::number("min_deg", "Lowest", "°", 1),
-            Column::number("max_deg", "Highest", "°", 1),
-            Column::number("speed_deg_s", "Speed", "°/s", 0),
-        ],
-    );
-    for joint in 0..6 {
-        let of = |values: Option<[f64; 6]>| Cell::from(values.map(|v| v[joint]));
-        table.push([(joint + 1).into(), of(joints.min_deg), of(joints.max_deg), of(joints.speed_deg_s)]);
-    }
+    let of = |values: Option<[f64; 6]>, joint: &usize| values.map(|values| values[*joint]);
+    let mut table = Table::of("Joints", 0..6)
+        .count("joint", "Joint", |joint| joint + 1)
+        .number("min_deg", "Lowest", "°", 1, |joint| of(joints.min_deg, joint))
+        .number("max_deg", "Highest", "°", 1, |joint| of(joints.max_deg, joint))
+        .number("speed_deg_s", "Speed", "°/s", 0, |joint| of(joints.speed_deg_s, joint))
+        .table();
     match joints.angles {
         Angles::Logged => {
             table
@@ -118,74 +92,52 @@ pub fn joint_table(robot: &Robot) -> Table {
 /// Masses and centres of mass; `None` if none are published.
 pub fn mass_table(robot: &Robot) -> Option<Table> {
     let masses = robot.sheet.masses.as_ref()?;
-    let mut columns = vec![Column::count("link", "Link"), Column::number("mass_kg", "Mass", "kg", 2)];
-    columns.extend(
-        ["x", "y", "z"]
-            .map(|axis| Column::number(format!("centre_{axis}_mm"), format!("centre {axis}"), "mm", 1)),
-    );
-    let mut table = Table::new("Masses", columns);
-    for (link, (mass, centre)) in masses.mass_kg.iter().zip(&masses.centre_mm).enumerate() {
-        table.push([(link + 1).into(), (*mass).into(), centre[0].into(), centre[1].into(), centre[2].into()]);
-    }
-    table.notes.push("Centres of mass in the frame at the end of each link.".to_owned());
-    Some(table)
+    let links = masses.mass_kg.iter().zip(&masses.centre_mm).enumerate();
+    let table = Table::of("Masses", links)
+        .count("link", "Link", |(link, _)| link + 1)
+        .number("mass_kg", "Mass", "kg", 2, |(_, (mass, _))| **mass)
+        .number("centre_x_mm", "centre x", "mm", 1, |(_, (_, centre))| centre[0])
+        .number("centre_y_mm", "centre y", "mm", 1, |(_, (_, centre))| centre[1])
+        .number("centre_z_mm", "centre z", "mm", 1, |(_, (_, centre))| centre[2])
+        .note("Centres of mass in the frame at the end of each link.");
+    Some(table.table())
 }
 
 /// Published poses, and the error of the links at them.
 pub fn published_table(robot: &Robot) -> Table {
-    let mut table = Table::new(
-        "Published poses",
-        vec![
-            Column::text("what", "Pose"),
-            Column::text("joints_deg", "Joints [°]"),
-            Column::text("point", "Point"),
-            Column::text("published_mm", "Published [mm]"),
-            Column::number("miss_mm", "Error", "mm", 3),
-            Column::number("tolerance_mm", "Tolerance", "mm", 3),
-            Column::number("turn_deg", "Rotation error", "°", 4),
-            Column::text("source", "Source"),
-        ],
-    );
-    for pose in &robot.sheet.published {
-        let (miss, turn) = validation::deviation(pose, &robot.model);
-        let stated = match (pose.position_mm, pose.radius_mm) {
-            (Some(position), _) => Cell::Text(list(&position)),
-            (None, Some(radius)) => Cell::Text(format!("{radius} from axis 1")),
-            (None, None) => Cell::Missing,
-        };
-        let point = match pose.point {
+    let poses = robot.sheet.published.iter();
+    Table::of("Published poses", poses.map(|pose| (pose, validation::deviation(pose, &robot.model))))
+        .text("what", "Pose", |(pose, _)| pose.what.as_str())
+        .text("joints_deg", "Joints [°]", |(pose, _)| list(&pose.joints_deg))
+        .text("point", "Point", |(pose, _)| match pose.point {
             Point::Flange => "flange",
             Point::WristCentre => "wrist centre",
-        };
-        table.push([
-            pose.what.as_str().into(),
-            list(&pose.joints_deg).into(),
-            point.into(),
-            stated,
-            miss.into(),
-            pose.tolerance_mm.into(),
-            turn.map(f64::to_degrees).into(),
-            pose.source.as_str().into(),
-        ]);
-    }
-    table.notes.push("Tolerance: rounding of the published numbers.".to_owned());
-    table
+        })
+        .text("published_mm", "Published [mm]", |(pose, _)| match (pose.position_mm, pose.radius_mm) {
+            (Some(position), _) => Some(list(&position)),
+            (None, radius) => radius.map(|radius| format!("{radius} from axis 1")),
+        })
+        .number("miss_mm", "Error", "mm", 3, |(_, (miss, _))| *miss)
+        .number("tolerance_mm", "Tolerance", "mm", 3, |(pose, _)| pose.tolerance_mm)
+        .number("turn_deg", "Rotation error", "°", 4, |(_, (_, turn))| turn.map(f64::to_degrees))
+        .text("source", "Source", |(pose, _)| pose.source.as_str())
+        .note("Tolerance: rounding of the published numbers.")
+        .table()
 }
 
 /// Sources of the numbers.
 pub fn source_table(robot: &Robot) -> Table {
     let sources = &robot.sheet.sources;
-    let mut table =
-        Table::new("Sources", vec![Column::text("numbers", "Numbers"), Column::text("source", "Source")]);
-    for (numbers, source) in [
+    let stated = [
         ("links and joint map", &sources.links),
         ("ranges and speeds", &sources.limits),
         ("masses", &sources.masses),
         ("payload, reach, repeatability", &sources.payload),
-    ] {
-        table.push([numbers.into(), words(source)]);
-    }
-    table
+    ];
+    Table::of("Sources", stated)
+        .text("numbers", "Numbers", |(numbers, _)| *numbers)
+        .text("source", "Source", |(_, source)| words(source))
+        .table()
 }
 
 /// The page of one robot.

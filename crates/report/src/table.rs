@@ -6,14 +6,12 @@ use super::status::Status;
 /// A table, independent of the format.
 ///
 /// ```
-/// use truegrind_report::table::{Cell, Column, Table};
 /// use truegrind_report::format::terminal;
-/// let mut table = Table::new(
-///     "Deviation",
-///     vec![Column::text("method", "method"), Column::number("rmse_mm", "RMSE", "mm", 2)],
-/// );
-/// table.push(["before".into(), 1.62.into()]);
-/// table.push(["LTLM".into(), Cell::Missing]);
+/// use truegrind_report::table::Table;
+/// let table = Table::of("Deviation", [("before", Some(1.62)), ("LTLM", None)])
+///     .text("method", "method", |(method, _)| *method)
+///     .number("rmse_mm", "RMSE", "mm", 2, |(_, rmse_mm)| *rmse_mm)
+///     .table();
 /// assert_eq!(terminal::table(&table, 80), "\
 /// Deviation
 /// method  RMSE [mm]
@@ -102,8 +100,68 @@ pub enum Cell {
     Missing,
 }
 
-/// A column with the function that makes its cells.
-pub type TypedColumn<T> = (Column, fn(&T) -> Cell);
+/// A table that gets its columns one by one, each with the function that makes its cells from the items.
+#[derive(Debug)]
+pub struct Rows<T> {
+    items: Vec<T>,
+    table: Table,
+}
+
+impl<T> Rows<T> {
+    /// Adds a column.
+    pub fn column<C: Into<Cell>>(mut self, column: Column, cell: impl Fn(&T) -> C) -> Self {
+        self.table.columns.push(column);
+        for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
+            row.push(cell(item).into());
+        }
+        self
+    }
+
+    /// Adds a column of texts.
+    pub fn text<C: Into<Cell>>(self, key: &str, heading: &str, cell: impl Fn(&T) -> C) -> Self {
+        self.column(Column::text(key, heading), cell)
+    }
+
+    /// Adds a column of integers.
+    pub fn count<C: Into<Cell>>(self, key: &str, heading: &str, cell: impl Fn(&T) -> C) -> Self {
+        self.column(Column::count(key, heading), cell)
+    }
+
+    /// Adds a column of numbers with fixed decimals; an empty unit means none.
+    pub fn number<C: Into<Cell>>(
+        self,
+        key: &str,
+        heading: &str,
+        unit: &str,
+        decimals: usize,
+        cell: impl Fn(&T) -> C,
+    ) -> Self {
+        self.column(Column::number(key, heading, unit, decimals), cell)
+    }
+
+    /// Adds a column of numbers with significant digits; for cells with σ, those of σ.
+    pub fn significant<C: Into<Cell>>(
+        self,
+        key: &str,
+        heading: &str,
+        unit: &str,
+        digits: usize,
+        cell: impl Fn(&T) -> C,
+    ) -> Self {
+        self.column(Column::significant(key, heading, unit, digits), cell)
+    }
+
+    /// Adds a remark below the table.
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.table.notes.push(note.into());
+        self
+    }
+
+    /// The table.
+    pub fn table(self) -> Table {
+        self.table
+    }
+}
 
 impl Table {
     /// An empty table.
@@ -111,16 +169,11 @@ impl Table {
         Self { title: title.into(), columns, rows: Vec::new(), notes: Vec::new() }
     }
 
-    /// A table with one row per item, from columns with the functions that make their cells.
-    pub fn of<'r, T: 'r, const N: usize>(
-        title: impl Into<String>,
-        items: impl IntoIterator<Item = &'r T>,
-        columns: [TypedColumn<T>; N],
-    ) -> Self {
-        let rows =
-            items.into_iter().map(|item| columns.iter().map(|(_, cell)| cell(item)).collect()).collect();
-        let columns = columns.into_iter().map(|(column, _)| column).collect();
-        Self { title: title.into(), columns, rows, notes: Vec::new() }
+    /// A table with one row per item, still without columns.
+    pub fn of<T>(title: impl Into<String>, items: impl IntoIterator<Item = T>) -> Rows<T> {
+        let items: Vec<T> = items.into_iter().collect();
+        let rows = vec![Vec::new(); items.len()];
+        Rows { items, table: Self { rows, ..Self::new(title, Vec::new()) } }
     }
 
     /// Adds a row.

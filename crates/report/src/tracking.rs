@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::document::{Block, Document, KeyFigure, PageVerdict, Provenance, Source};
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
-use super::table::{Cell, Column, Table};
+use super::table::{Cell, Table};
 use truegrind_arm::parameter::display_unit;
 use truegrind_calibration::tracking::alarm::Mount;
 use truegrind_calibration::tracking::gain::Gain;
@@ -419,26 +419,15 @@ const LISTED: usize = 3;
 
 /// Current parameters.
 pub fn table(tracker: &Tracker) -> Table {
-    let mut table = Table::new(
-        "Parameters, as deviations from the initial model",
-        vec![
-            Column::text("parameter", "Parameter"),
-            Column::text("unit", "Unit"),
-            Column::significant("value", "deviation", "", 2),
-        ],
-    );
-    let sigmas = tracker.sigmas();
-    for (k, ((parameter, value), sigma)) in
-        tracker.parameters().iter().zip(tracker.deviations()).zip(sigmas).enumerate()
-    {
-        let (scale, unit) = display_unit(parameter.unit());
-        table.push([
-            tracker.name(k).into(),
-            unit.into(),
-            Cell::with_sigma(value * scale, Some(sigma * scale)),
-        ]);
-    }
-    table
+    let estimates = tracker.deviations().iter().zip(tracker.sigmas());
+    let parameters = tracker.parameters().iter().map(|parameter| display_unit(parameter.unit()));
+    Table::of("Parameters, as deviations from the initial model", parameters.zip(estimates).enumerate())
+        .text("parameter", "Parameter", |(k, _)| tracker.name(*k))
+        .text("unit", "Unit", |(_, ((_, unit), _))| *unit)
+        .significant("value", "deviation", "", 2, |(_, ((scale, _), (value, sigma)))| {
+            Cell::with_sigma(*value * scale, Some(sigma * scale))
+        })
+        .table()
 }
 
 /// JSON report, schema `truegrind.track-report/1`.

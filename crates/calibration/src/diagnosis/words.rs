@@ -103,7 +103,7 @@ pub(super) fn finding(
         decided_by: None,
         corrected: None,
         alternatives: Vec::new(),
-        remedy: remedy(effect).to_owned(),
+        remedy: effect.remedy().to_owned(),
     }
 }
 
@@ -416,56 +416,15 @@ fn largest_tilt([a, b, c, d]: [f64; 4]) -> f64 {
 
 /// The residual pattern that reveals a cause.
 pub fn describe_pattern(cause: &Cause) -> String {
-    use CauseKind::*;
     let joint = cause.joints().first().map_or(0, |j| j + 1);
     match cause.kind() {
-        JointCompliance => format!("the residual follows the static torque on joint {joint}"),
-        LinkBending => {
-            format!("the residual about joints {joint} and {} follows the static torques on both", joint + 1)
-        }
-        GearEccentricity => format!("the residual about joint {joint} oscillates with its angle"),
-        GearTransmission => format!("the residual about joint {joint} is periodic in its angle"),
-        GearRatio => format!("the residual about joint {joint} is proportional to its angle"),
-        JointCoupling => format!("the residual about a joint grows with the angle of joint {joint}"),
-        Backlash if cause.is_empirical() => {
+        CauseKind::Backlash if cause.is_empirical() => {
             format!("the residual about joint {joint} changes sign with its static torque")
         }
-        Backlash => format!("the residual about joint {joint} changes sign with the approach side"),
-        ThermalDrift => "the residual grows with time or temperature".to_owned(),
-        PayloadChange => {
-            "the residual follows the torque of a mass at the flange in these rows alone".to_owned()
-        }
-        JointZeroShift => format!("the residual about joint {joint} steps by one angle in these rows"),
-        SensorZeroShift => "the cable's residual steps by one amount in these rows".to_owned(),
-        SensorFrameShift => "the residual steps by one vector in the base in these rows".to_owned(),
-        ToolShift if cause.is_thermal() => {
+        CauseKind::ToolShift if cause.is_thermal() => {
             "the residual grows with time or temperature along one vector on the flange".to_owned()
         }
-        ToolShift => "the residual steps by one vector on the flange in these rows".to_owned(),
-        Latency => "the residual follows the speed of the joints".to_owned(),
-        Unsettled => "the residual points to the previous pose".to_owned(),
-        JointStiffness => {
-            format!("the residual about joint {joint} follows its torque, but not in proportion")
-        }
-        GearTwoJoints => format!("the residual about joint {joint} oscillates with the angles of two joints"),
-        AxisWobble => {
-            format!("the residual tilts about the axis of joint {joint} twice in a turn of it")
-        }
-        AirRefraction => "the vertical residual grows with the square of the distance".to_owned(),
-        CablePulley => "the residual follows the direction of the cable".to_owned(),
-        CableDrum => "the residual follows powers of the cable's length".to_owned(),
-        TargetNest => "the residual follows the direction of the beam in the target's frame".to_owned(),
-        TargetDroop => "the residual follows the direction of gravity in the flange's frame".to_owned(),
-        BaseTilt => "the residual turns about the base with the overturning moment of the arm".to_owned(),
-        SensorAxes => {
-            "the residual is proportional to the reading, but not alike along the sensor's axes".to_owned()
-        }
-        SensorRange => "the residual follows the distance along the beam".to_owned(),
-        LensDistortion => "the residual grows with the distance from the camera's axis".to_owned(),
-        CableReversal => "the residual changes sign with the way in which the cable last moved".to_owned(),
-        SensorScale => "the residual is proportional to the reading".to_owned(),
-        CableSag => "the residual grows with the square of the cable's horizontal span".to_owned(),
-        _ => "see the picture".to_owned(),
+        kind => kind.pattern(joint),
     }
 }
 
@@ -488,7 +447,7 @@ pub(super) fn remedy_of(cause: &Cause) -> &'static str {
             "from the sensor's place measure one point on the floor and one on the base of the arm, before and after: if both move, it is the \
              sensor's stand, if only the base, its bolts"
         }
-        kind => remedy(kind),
+        kind => kind.remedy(),
     }
 }
 
@@ -497,7 +456,7 @@ pub(super) fn remedy_left_out(effect: CauseKind, uncertain: bool) -> String {
     use CauseKind::*;
     let why = if uncertain { ", since it is not certain" } else { " (see the notes)" };
     let left = format!("do not expect programs to be corrected for it: the written model leaves it out{why}");
-    // What of `remedy` holds without a model.
+    // What of the usual remedy holds without a model.
     let further = match effect {
         JointCompliance => "check belts and reducer preload",
         LinkBending => "check the bolts of this link",
@@ -505,96 +464,7 @@ pub(super) fn remedy_left_out(effect: CauseKind, uncertain: bool) -> String {
         GearTransmission => "inspect the reducer for wear",
         Backlash => "approach every point from the same side",
         SmoothCorrection => return left,
-        _ => remedy(effect),
+        _ => effect.remedy(),
     };
     format!("{left}; {further}")
-}
-
-/// The recommended action for a kind of cause.
-pub fn remedy(effect: CauseKind) -> &'static str {
-    use CauseKind::*;
-    match effect {
-        LinkGeometry => {
-            "compare the type plate and the controller's kinematics with the data sheet before anything else; write the arm's own data sheet if it \
-             is a variant"
-        }
-        JointCompliance => {
-            "compensate with this model, which includes the compliance; check belts and reducer preload if it has grown"
-        }
-        LinkBending => {
-            "compensate with this model, which includes the bending; check the bolts of this link and keep the payload as measured"
-        }
-        GearEccentricity => {
-            "compensate with this model; at the next repair, reseat or replace the eccentric gear or encoder ring"
-        }
-        GearTransmission => "compensate with this model; inspect the reducer for wear if the amplitude grows",
-        GearRatio => "compare the ratio in the controller's motor configuration with the installed gear",
-        JointCoupling => {
-            "check the coupling ratio in the controller's configuration; the wrist's gear train might have been replaced"
-        }
-        Backlash => {
-            "approach every point from the same side, or compensate with the approach side; adjust the gear mesh"
-        }
-        ThermalDrift => "warm the arm up before measuring and grinding, or measure in both states",
-        PayloadChange => {
-            "log the payload of every row; measure these rows again with the payload of the program"
-        }
-        JointZeroShift => {
-            "check encoder, belt and mastering of this joint; measure these rows again, since the written arm is that of the other rows"
-        }
-        SensorZeroShift => {
-            "check the cable's clamp and drum; measure a reference point before and after each session"
-        }
-        SensorFrameShift => {
-            "fix the sensor's stand, check the bolts of the arm's base; measure reference points before and after each session"
-        }
-        ToolShift => "fasten the hook or reflector; measure the rows after the slip again",
-        SensorScale => "check the sensor against a length standard",
-        SensorAxes => "recalibrate the sensor, and check it against a length standard along each of its axes",
-        SensorRange => {
-            "check the reflector's constant and the sensor against a length standard at several distances"
-        }
-        LensDistortion => {
-            "calibrate the camera's lens again, or keep the target near the middle of the picture"
-        }
-        CableReversal => {
-            "approach each pose so that the cable always pays out; check its drum, guide and spring"
-        }
-        Latency => "record angles and readings with the same clock, or measure at rest",
-        Unsettled => "wait longer before each reading",
-        JointStiffness => {
-            "measure this joint with and without load, approached under the same torque; the written model includes only the linear part"
-        }
-        GearTwoJoints => {
-            "measure both joints over their whole range, one at a time and together; inspect the cable that crosses them"
-        }
-        AxisWobble => {
-            "inspect the bearing of this joint with a dial gauge, axially, over a whole turn; the written model leaves it out"
-        }
-        AirRefraction => {
-            "measure at uniform air temperature and short distance, or with the tracker at the height of the arm"
-        }
-        CablePulley => {
-            "inspect outlet and pulley; measure with the cable in one direction as far as possible"
-        }
-        CableDrum => "check the cable sensor against a length standard over its whole range",
-        TargetNest => "turn the target towards the sensor; check its nest and replace the reflector",
-        TargetDroop => {
-            "stiffen the target's pole or adapter, or measure with the target near the flange; the written model leaves it out, since \
-             a tool does not droop this way"
-        }
-        BaseTilt => {
-            "bolt or grout the pedestal, and read a level on it with the arm stretched out and folded; the written model contains \
-             only the part that looks like compliance of joint 2, so measure again afterwards"
-        }
-        CableSag => "increase the cable's tension or shorten the distance",
-        AngleRounding => "log angles with more digits",
-        ReadoutMismatch => "record angles and read-out at the same time, at rest; measure these rows again",
-        Outliers => "measure these rows again",
-        SetupChange => {
-            "measure reference points before and after each session, and repeat the rows of displaced sessions"
-        }
-        SmallDisturbances => "nothing: the arm's share of them is in the model",
-        _ => "measure more poses where the picture shows the largest residuals",
-    }
 }

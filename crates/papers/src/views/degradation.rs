@@ -13,7 +13,7 @@ use truegrind_math::statistics::mean_and_deviation;
 use truegrind_report::document::{Block, Document, PageVerdict};
 use truegrind_report::number::Precision;
 use truegrind_report::status::Status;
-use truegrind_report::table::{Cell, Column, Table};
+use truegrind_report::table::{Cell, Table};
 
 /// Terminal.
 pub(super) fn summary(page: &mut Document, result: &DegradationResult) {
@@ -143,21 +143,15 @@ fn headline(result: &DegradationResult) -> String {
 }
 
 fn groups(result: &DegradationResult) -> Table {
-    let mut table = Table::new(
+    Table::of(
         format!("Mean position error of each group, {SIMULATED} (Fig. 4)"),
-        vec![
-            Column::count("group", "Group"),
-            Column::number("time_h", "time", "h", 1),
-            Column::number("nominal_mm", "nominal arm", "mm", 4),
-            Column::number("neglected_mm", "calibrated in group 1 alone", "mm", 4),
-        ],
-    );
-    for (g, (nominal, neglected)) in result.nominal_mm.iter().zip(&result.neglected_mm).enumerate() {
-        let hours = result.settings.hours_apart * g as f64;
-        table.push([(g + 1).into(), hours.into(), (*nominal).into(), (*neglected).into()]);
-    }
-    table.notes = vec![
-        format!(
+        result.nominal_mm.iter().zip(&result.neglected_mm).enumerate(),
+    )
+    .count("group", "Group", |(g, _)| g + 1)
+    .number("time_h", "time", "h", 1, |(g, _)| result.settings.hours_apart * *g as f64)
+    .number("nominal_mm", "nominal arm", "mm", 4, |(_, (nominal, _))| **nominal)
+    .number("neglected_mm", "calibrated in group 1 alone", "mm", 4, |(_, (_, neglected))| **neglected)
+    .note(format!(
             "Mean over {} simulated arms. Links grow by {:e} per kelvin, towards a further rise of {} K (links 1 to 6) with a \
              time constant of {} h; zeros of joints 1 to 6 drift by {} °/h.",
             result.settings.arms,
@@ -165,10 +159,9 @@ fn groups(result: &DegradationResult) -> Table {
             listed(&result.settings.heat.rise_k),
             result.settings.heat.time_constant_h,
             listed(&result.settings.wear.zero_deg_per_h)
-        ),
-        format!("The sensor alone: {:.4} mm.", result.noise_floor_mm),
-    ];
-    table
+        ))
+    .note(format!("The sensor alone: {:.4} mm.", result.noise_floor_mm))
+    .table()
 }
 
 fn listed(values: &[f64]) -> String {
@@ -182,39 +175,28 @@ fn counts(result: &DegradationResult) -> Table {
         let better = [count.identification_mm, count.verification_mm].map(|mm| percent(nominal, mm));
         (count, better, paper)
     });
-    let mut table = Table::of(
+    Table::of(
         format!("How many poses, first group, {SIMULATED} (Fig. 7, Table 2)"),
-        &rows.collect::<Vec<_>>(),
-        [
-            (Column::count("poses", "Poses"), |(count, ..)| count.poses.into()),
-            (Column::count("equations", "Equations"), |(count, ..)| count.equations.into()),
-            (Column::count("rank", "Rank"), |(count, ..)| count.rank.into()),
-            (Column::significant("condition", "Condition", "", 2), |(count, ..)| count.condition.into()),
-            (Column::number("identification_mm", "id.", "", 4), |(count, ..)| count.identification_mm.into()),
-            (Column::number("verification_mm", "ver.", "", 4), |(count, ..)| count.verification_mm.into()),
-            (Column::number("identification_percent", "id. better", "", 1), |(_, better, _)| {
-                better[0].into()
-            }),
-            (Column::number("paper_identification_percent", "paper", "", 1), |(.., paper)| {
-                paper.map(|p| p.identification_percent).into()
-            }),
-            (Column::number("verification_percent", "ver. better", "", 1), |(_, better, _)| better[1].into()),
-            (Column::number("paper_verification_percent", "paper", "", 1), |(.., paper)| {
-                paper.map(|p| p.verification_percent).into()
-            }),
-            (Column::number("without_prior_mm", "no prior", "", 4), |(count, ..)| {
-                count.without_prior_mm.into()
-            }),
-        ],
-    );
-    table.notes = vec![
-        "RLS; errors in mm of identification (id.) and verification poses (ver.), improvement (better) in %. Rank: of 24 link \
+        rows,
+    )
+    .count("poses", "Poses", |(count, ..)| count.poses)
+    .count("equations", "Equations", |(count, ..)| count.equations)
+    .count("rank", "Rank", |(count, ..)| count.rank)
+    .significant("condition", "Condition", "", 2, |(count, ..)| count.condition)
+    .number("identification_mm", "id.", "", 4, |(count, ..)| count.identification_mm)
+    .number("verification_mm", "ver.", "", 4, |(count, ..)| count.verification_mm)
+    .number("identification_percent", "id. better", "", 1, |(_, better, _)| better[0])
+    .number("paper_identification_percent", "paper", "", 1, |(.., paper)| {
+        paper.map(|p| p.identification_percent)
+    })
+    .number("verification_percent", "ver. better", "", 1, |(_, better, _)| better[1])
+    .number("paper_verification_percent", "paper", "", 1, |(.., paper)| paper.map(|p| p.verification_percent))
+    .number("without_prior_mm", "no prior", "", 4, |(count, ..)| count.without_prior_mm)
+.note("RLS; errors in mm of identification (id.) and verification poses (ver.), improvement (better) in %. Rank: of 24 link \
          parameters with known frames, smallest over the arms. Condition: in units of the tolerances, largest over the arms. \
-         No prior: error of the verification poses after least squares without priors."
-            .to_owned(),
-        "Better: relative to the nominal arm. The paper's percentages are of its own arm.".to_owned(),
-    ];
-    table
+         No prior: error of the verification poses after least squares without priors.")
+.note("Better: relative to the nominal arm. The paper's percentages are of its own arm.")
+.table()
 }
 
 fn percent(before: f64, after: f64) -> f64 {
@@ -230,132 +212,93 @@ pub(super) fn table(result: &DegradationResult) -> Table {
         };
         (run, percent(nominal, after(run)), result.settings.paper.iter().find(is_of_run))
     });
-    let mut table = Table::of(
+    Table::of(
         format!(
             "Repeated calibration over {} groups, {SIMULATED} (Figs 9 to 14, Table 4)",
             result.settings.groups
         ),
-        &rows.collect::<Vec<_>>(),
-        [
-            (Column::count("poses", "Poses"), |(run, ..)| run.count.into()),
-            (Column::text("method", "Method"), |(run, ..)| run.strategy.name().into()),
-            (Column::number("identification_before_mm", "id. before", "", 3), |(run, ..)| {
-                run.mean(|s| s.identification_before_mm).into()
-            }),
-            (Column::number("identification_after_mm", "after", "", 3), |(run, ..)| {
-                run.mean(|s| s.identification_after_mm).into()
-            }),
-            (Column::number("verification_before_mm", "ver. before", "", 3), |(run, ..)| {
-                run.mean(|s| s.verification_before_mm).into()
-            }),
-            (Column::number("verification_after_mm", "after", "", 3), |(run, ..)| {
-                let deviation = (run.arms_mm.len() > 1).then(|| mean_and_deviation(&run.arms_mm).1);
-                Cell::with_sigma(after(run), deviation)
-            }),
-            (Column::number("paper_after_mm", "paper", "", 3), |(.., paper)| {
-                paper.and_then(|p| p.verification_after_mm).into()
-            }),
-            (Column::number("improvement_percent", "better", "", 1), |(_, better, _)| (*better).into()),
-            (Column::number("paper_improvement_percent", "paper", "", 1), |(.., paper)| {
-                paper.and_then(|p| p.improvement_percent).into()
-            }),
-        ],
-    );
-    table.notes = vec![
-        "Errors in mm, improvement (better) in %. Means over groups and arms of identification (id.) and verification poses \
+        rows,
+    )
+    .count("poses", "Poses", |(run, ..)| run.count)
+    .text("method", "Method", |(run, ..)| run.strategy.name())
+    .number("identification_before_mm", "id. before", "", 3, |(run, ..)| {
+        run.mean(|s| s.identification_before_mm)
+    })
+    .number("identification_after_mm", "after", "", 3, |(run, ..)| run.mean(|s| s.identification_after_mm))
+    .number("verification_before_mm", "ver. before", "", 3, |(run, ..)| {
+        run.mean(|s| s.verification_before_mm)
+    })
+    .number("verification_after_mm", "after", "", 3, |(run, ..)| {
+        let deviation = (run.arms_mm.len() > 1).then(|| mean_and_deviation(&run.arms_mm).1);
+        Cell::with_sigma(after(run), deviation)
+    })
+    .number("paper_after_mm", "paper", "", 3, |(.., paper)| paper.and_then(|p| p.verification_after_mm))
+    .number("improvement_percent", "better", "", 1, |(_, better, _)| *better)
+    .number("paper_improvement_percent", "paper", "", 1, |(.., paper)| {
+        paper.and_then(|p| p.improvement_percent)
+    })
+.note("Errors in mm, improvement (better) in %. Means over groups and arms of identification (id.) and verification poses \
          (ver.), ± the standard deviation over the arms. before: with the estimate of the previous group, for the first group \
          the nominal arm; better: relative to the nominal arm. The paper's after and its percentage are of the verification \
-         poses of its own measured arm, with 0.690698 mm for the nominal arm; its \"LM\" is shown with the closest variant."
-            .to_owned(),
-        format!("{} poses of a group correspond to the paper's periodic calibration.", result.settings.identification),
-    ];
-    table
+         poses of its own measured arm, with 0.690698 mm for the nominal arm; its \"LM\" is shown with the closest variant.")
+.note(format!("{} poses of a group correspond to the paper's periodic calibration.", result.settings.identification))
+.table()
 }
 
 fn against_rls(result: &DegradationResult) -> Table {
-    let mut table = Table::of(
-        format!("Every method against RLS with the same poses, {SIMULATED}"),
-        &result.against_rls,
-        [
-            (Column::count("poses", "Poses"), |one| one.count.into()),
-            (Column::text("method", "Method"), |one| one.strategy.name().into()),
-            (Column::number("difference_mm", "difference", "mm", 4), |one| one.mean_mm.into()),
-            (Column::text("better_in", "RLS better in"), |one| {
-                format!("{} of {} arms", one.rls_better, one.arms).into()
-            }),
-            (Column::text("p", "p, signed rank"), |one| words::p(one.p).into()),
-            (Column::text("conclusion", "Conclusion"), |one| match one.outcome {
-                Outcome::RlsBetter => "RLS better".into(),
-                Outcome::StrategyBetter => format!("{} better", one.strategy.name()).into(),
-                Outcome::Same => "the same within 2 %".into(),
-                Outcome::NotSignificant => "no significant difference".into(),
-            }),
-        ],
-    );
-    table.notes = vec![format!(
+    Table::of(format!("Every method against RLS with the same poses, {SIMULATED}"), &result.against_rls)
+            .count("poses", "Poses", |one| one.count)
+            .text("method", "Method", |one| one.strategy.name())
+            .number("difference_mm", "difference", "mm", 4, |one| one.mean_mm)
+            .text("better_in", "RLS better in", |one| format!("{} of {} arms", one.rls_better, one.arms))
+            .text("p", "p, signed rank", |one| words::p(one.p))
+            .text("conclusion", "Conclusion", |one| match one.outcome {
+                Outcome::RlsBetter => "RLS better".to_owned(),
+                Outcome::StrategyBetter => format!("{} better", one.strategy.name()),
+                Outcome::Same => "the same within 2 %".to_owned(),
+                Outcome::NotSignificant => "no significant difference".to_owned(),
+            })
+.note(format!(
         "Mean error of the verification poses after calibration, over all groups; method minus RLS, paired over the {} \
          simulated arms. p: two-sided, after Holm's correction over {} comparisons.",
         result.settings.arms,
         result.against_rls.len()
-    )];
-    table
+    ))
+.table()
 }
 
 fn steps(result: &DegradationResult) -> Table {
     let rows = result.runs.iter().flat_map(|run| run.steps.iter().map(move |step| (run, step)));
-    Table::of(
-        format!("Group by group, {SIMULATED}"),
-        &rows.collect::<Vec<_>>(),
-        [
-            (Column::count("poses", "Poses"), |(run, _)| run.count.into()),
-            (Column::text("method", "Method"), |(run, _)| run.strategy.name().into()),
-            (Column::count("group", "Group"), |(_, step)| (step.group + 1).into()),
-            (Column::number("identification_before_mm", "identify, before", "mm", 4), |(_, step)| {
-                step.identification_before_mm.into()
-            }),
-            (Column::number("identification_after_mm", "after", "mm", 4), |(_, step)| {
-                step.identification_after_mm.into()
-            }),
-            (Column::number("verification_before_mm", "verify, before", "mm", 4), |(_, step)| {
-                step.verification_before_mm.into()
-            }),
-            (Column::number("verification_after_mm", "after", "mm", 4), |(_, step)| {
-                step.verification_after_mm.into()
-            }),
-        ],
-    )
+    Table::of(format!("Group by group, {SIMULATED}"), rows)
+        .count("poses", "Poses", |(run, _)| run.count)
+        .text("method", "Method", |(run, _)| run.strategy.name())
+        .count("group", "Group", |(_, step)| step.group + 1)
+        .number("identification_before_mm", "identify, before", "mm", 4, |(_, step)| {
+            step.identification_before_mm
+        })
+        .number("identification_after_mm", "after", "mm", 4, |(_, step)| step.identification_after_mm)
+        .number("verification_before_mm", "verify, before", "mm", 4, |(_, step)| step.verification_before_mm)
+        .number("verification_after_mm", "after", "mm", 4, |(_, step)| step.verification_after_mm)
+        .table()
 }
 
 /// Measured times.
 pub(super) fn times(result: &DegradationResult) -> Table {
-    let mut table = Table::new(
+    let most = result.settings.identification;
+    let with_all = |one: &Run| run_of(result, one.strategy, most).map_or(f64::NAN, |run| run.seconds);
+    Table::of(
         format!(
             "Time for all groups of one arm, {SIMULATED}, measured on this machine (not the same in every run)"
         ),
-        vec![
-            Column::count("poses", "Poses"),
-            Column::text("method", "Method"),
-            Column::significant("time_s", "time", "s", 2),
-            Column::number("saved_percent", "saved against all poses", "%", 1),
-            Column::number("measuring_saved_percent", "measuring saved", "%", 1),
-        ],
-    );
-    let most = result.settings.identification;
-    for one in &result.runs {
-        let all = run_of(result, one.strategy, most).map_or(f64::NAN, |j| j.seconds);
-        table.push([
-            one.count.into(),
-            one.strategy.name().into(),
-            one.seconds.into(),
-            percent(all, one.seconds).into(),
-            percent(most as f64, one.count as f64).into(),
-        ]);
-    }
-    table.notes = vec![
-        "The paper: 212.86 s with 50 poses, 64.88 s with 15, 69.52 % saved; 70 % of the measuring."
-            .to_owned(),
-    ];
-    table
+        &result.runs,
+    )
+    .count("poses", "Poses", |one| one.count)
+    .text("method", "Method", |one| one.strategy.name())
+    .significant("time_s", "time", "s", 2, |one| one.seconds)
+    .number("saved_percent", "saved against all poses", "%", 1, |one| percent(with_all(one), one.seconds))
+    .number("measuring_saved_percent", "measuring saved", "%", 1, |one| percent(most as f64, one.count as f64))
+    .note("The paper: 212.86 s with 50 poses, 64.88 s with 15, 69.52 % saved; 70 % of the measuring.")
+    .table()
 }
 
 /// The whole result as JSON, without measured times.

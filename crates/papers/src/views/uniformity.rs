@@ -7,7 +7,7 @@ use truegrind_report::document::{Block, Document, PageVerdict};
 use truegrind_report::number::Precision;
 use truegrind_report::plot::{Axis, Graph, Histogram, Reference, Sample, Series};
 use truegrind_report::status::Status;
-use truegrind_report::table::{Cell, Column, Table};
+use truegrind_report::table::{Cell, Table};
 
 /// Terminal.
 pub(super) fn summary(page: &mut Document, result: &UniformityResult) {
@@ -80,32 +80,23 @@ fn thousands(count: usize) -> String {
 /// The maps of Table 2.
 fn maps(result: &UniformityResult) -> Table {
     let settings = &result.settings;
-    let mut table = Table::new(
-        "Standard deviation of the counts, the maps of the paper's Table 2",
-        vec![
-            Column::text("map", "Map"),
-            Column::number("short", format!("{} points", thousands(settings.points)), "", 1),
-            Column::number("short_random", "random", "", 1),
-            Column::number("long", format!("{} points", thousands(settings.long_points)), "", 0),
-            Column::number("long_random", "random", "", 0),
-        ],
-    );
-    for of in &result.maps {
-        table.push([
-            of.map.name().into(),
-            Cell::with_sigma(of.short.deviation, Some(of.short.spread)),
-            of.short.random.into(),
-            Cell::with_sigma(of.long.deviation, Some(of.long.spread)),
-            of.long.random.into(),
-        ]);
-    }
-    table.notes = vec![format!(
-        "± is the standard deviation over {} starts. Tent and Bernoulli would collapse to 0 in binary floating point, so \
+    Table::of("Standard deviation of the counts, the maps of the paper's Table 2", &result.maps)
+        .text("map", "Map", |of| of.map.name())
+        .number("short", &format!("{} points", thousands(settings.points)), "", 1, |of| {
+            Cell::with_sigma(of.short.deviation, Some(of.short.spread))
+        })
+        .number("short_random", "random", "", 1, |of| of.short.random)
+        .number("long", &format!("{} points", thousands(settings.long_points)), "", 0, |of| {
+            Cell::with_sigma(of.long.deviation, Some(of.long.spread))
+        })
+        .number("long_random", "random", "", 0, |of| of.long.random)
+        .note(format!(
+            "± is the standard deviation over {} starts. Tent and Bernoulli would collapse to 0 in binary floating point, so \
              random bits are appended at the low end. Logistic, sine, Chebyshev and Hénon have non-uniform densities by \
              design.",
-        settings.starts
-    )];
-    table
+            settings.starts
+        ))
+        .table()
 }
 
 fn verdict(result: &UniformityResult) -> PageVerdict {
@@ -168,27 +159,19 @@ fn over_r(result: &UniformityResult, long: bool) -> String {
 
 /// One row for each r.
 pub(super) fn table(result: &UniformityResult) -> Table {
-    let mut table = Table::new(
-        "Standard deviation of the counts",
-        vec![
-            Column::number("r", "r", "", 2),
-            Column::number("short", format!("{} points", thousands(result.settings.points)), "", 2),
-            Column::number("short_random", "random", "", 2),
-            Column::number("long", format!("{} points", thousands(result.settings.long_points)), "", 1),
-            Column::number("long_random", "random", "", 1),
-        ],
-    );
-    for point in &result.study.points {
-        table.push([
-            point.r.into(),
-            Cell::with_sigma(point.short.deviation, Some(point.short.spread)),
-            point.short.random.into(),
-            Cell::with_sigma(point.long.deviation, Some(point.long.spread)),
-            point.long.random.into(),
-        ]);
-    }
-    table.notes = vec![format!("± is the standard deviation over {} starts.", result.settings.starts)];
-    table
+    let settings = &result.settings;
+    Table::of("Standard deviation of the counts", &result.study.points)
+        .number("r", "r", "", 2, |point| point.r)
+        .number("short", &format!("{} points", thousands(settings.points)), "", 2, |point| {
+            Cell::with_sigma(point.short.deviation, Some(point.short.spread))
+        })
+        .number("short_random", "random", "", 2, |point| point.short.random)
+        .number("long", &format!("{} points", thousands(settings.long_points)), "", 1, |point| {
+            Cell::with_sigma(point.long.deviation, Some(point.long.spread))
+        })
+        .number("long_random", "random", "", 1, |point| point.long.random)
+        .note(format!("± is the standard deviation over {} starts.", settings.starts))
+        .table()
 }
 
 /// Everything.

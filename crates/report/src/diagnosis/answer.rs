@@ -3,7 +3,7 @@
 use super::words::{AMBIGUOUS, confidence, family, located, member, not_certain};
 use crate::document::{Block, PageVerdict};
 use crate::status::Status;
-use crate::table::{Column, Table};
+use crate::table::Table;
 use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::decision::DIAGNOSIS_FILE;
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, Finding};
@@ -140,24 +140,17 @@ pub(super) fn blocks(diagnosis: &Diagnosis) -> Vec<Block> {
 
 fn findings(diagnosis: &Diagnosis) -> Table {
     let numbered: Vec<(usize, &Finding)> = (1..).zip(&diagnosis.findings).collect();
-    let mut table = Table::of(
-        "",
-        &numbered,
-        [
-            (Column::text("number", "no."), |(number, _)| number.to_string().into()),
-            (Column::text("cause", "cause"), |(_, finding)| in_short(finding).into()),
-            (Column::text("confidence", "how sure"), |(_, finding)| match finding.effect {
-                CauseKind::Unexplained | CauseKind::SmallDisturbances => "".into(),
-                _ => confidence(finding).into(),
-            }),
-            (Column::number("worth_mm", "explains", "mm", 3), |(_, finding)| finding.worth_mm.into()),
-        ],
-    );
-    table.notes.push(
-        "explains: the part of the readings that only this cause explains, RMS over all rows. identified: it explains them better \
-         than its alternatives, and is found again in halves of the rows."
-            .to_owned(),
-    );
+    let mut table = Table::of("", &numbered)
+        .text("number", "no.", |(number, _)| number.to_string())
+        .text("cause", "cause", |(_, finding)| in_short(finding))
+        .text("confidence", "how sure", |(_, finding)| match finding.effect {
+            CauseKind::Unexplained | CauseKind::SmallDisturbances => "",
+            _ => confidence(finding),
+        })
+        .number("worth_mm", "explains", "mm", 3, |(_, finding)| finding.worth_mm)
+.note("explains: the part of the readings that only this cause explains, RMS over all rows. identified: it explains them better \
+         than its alternatives, and is found again in halves of the rows.")
+.table();
     if diagnosis.findings.iter().any(is_possible) {
         table.notes.push(AMBIGUOUS.to_owned());
     }

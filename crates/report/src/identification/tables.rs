@@ -80,29 +80,21 @@ pub fn parameter_table(found: &Identification) -> Table {
     let mut table = Table::of(
         "Estimated parameters",
         &of_arm.map(|parameter| (handy(parameter), held(parameter, as_printed))).collect::<Vec<_>>(),
-        [
-            (Column::text("name", "Parameter"), |(shown, _)| shown.name.as_str().into()),
-            (Column::significant("nominal", "Nominal", "", 6), |(shown, _)| shown.nominal.into()),
-            (Column::significant("value", "Estimated ± σ", "", 2), |(shown, _)| {
-                Cell::with_sigma(shown.value, Some(shown.sigma))
-            }),
-            (Column::number("deviation", "Deviation", "", 4), |(shown, _)| {
-                (shown.value - shown.nominal).into()
-            }),
-            (Column::text("unit", "Unit"), |(shown, _)| shown.unit.as_str().into()),
-            (Column::significant("prior_sigma", "Tolerance", "", 2), |(shown, _)| shown.prior_sigma.into()),
-            (Column::number("determined_percent", "Determined", "%", 0), |(shown, _)| {
-                (100.0 * shown.determined).into()
-            }),
-            (Column::text("held", "Held by"), |(_, held)| held.clone()),
-        ],
-    );
-    table.notes.push(
-        "Tolerance: standard deviation of the prior, the manufacturing tolerance. Determined: share contributed by the data, \
+    )
+    .text("name", "Parameter", |(shown, _)| shown.name.as_str())
+    .significant("nominal", "Nominal", "", 6, |(shown, _)| shown.nominal)
+    .significant("value", "Estimated ± σ", "", 2, |(shown, _)| {
+        Cell::with_sigma(shown.value, Some(shown.sigma))
+    })
+    .number("deviation", "Deviation", "", 4, |(shown, _)| shown.value - shown.nominal)
+    .text("unit", "Unit", |(shown, _)| shown.unit.as_str())
+    .significant("prior_sigma", "Tolerance", "", 2, |(shown, _)| shown.prior_sigma)
+    .number("determined_percent", "Determined", "%", 0, |(shown, _)| 100.0 * shown.determined)
+    .text("held", "Held by", |(_, held)| held.clone())
+.note("Tolerance: standard deviation of the prior, the manufacturing tolerance. Determined: share contributed by the data, \
          1 − (σ / tolerance)². A parameter below 50 % is known more from its prior than from the data; if it changed anyway, the data \
-         determine a combination of parameters, which the priors distribute over its members."
-            .to_owned(),
-    );
+         determine a combination of parameters, which the priors distribute over its members.")
+.table();
     if as_printed {
         table.notes.push(
             "This method has no priors: undetermined parameters moved freely. These values are not a geometry.".to_owned(),
@@ -190,19 +182,12 @@ fn meaning(name: &str) -> &'static str {
 
 /// Error of each held-out row, frames registered and geometry.
 pub fn held_out_table(found: &Identification) -> Table {
-    let mut table = Table::of(
-        "Held-out rows",
-        &by_row(found),
-        [
-            (Column::count("row", "Row"), |(row, ..)| (*row).into()),
-            (Column::number("registered_mm", "frames registered", "mm", 3), |(_, before, _)| {
-                (*before).into()
-            }),
-            (Column::number("geometry_mm", "geometry", "mm", 3), |(.., after)| (*after).into()),
-        ],
-    );
-    table.notes.push("Row numbers as in the spreadsheet.".to_owned());
-    table
+    Table::of("Held-out rows", &by_row(found))
+        .count("row", "Row", |(row, ..)| *row)
+        .number("registered_mm", "frames registered", "mm", 3, |(_, before, _)| *before)
+        .number("geometry_mm", "geometry", "mm", 3, |(.., after)| *after)
+        .note("Row numbers as in the spreadsheet.")
+        .table()
 }
 
 /// Held-out errors in the order of the file.
@@ -214,29 +199,15 @@ pub(super) fn by_row(found: &Identification) -> Vec<(usize, f64, f64)> {
 
 /// Rows that were set aside, with their errors.
 pub fn outlier_table(found: &Identification, dataset: &Dataset) -> Table {
-    let mut table = Table::new(
-        "Rows set aside",
-        vec![
-            Column::count("row", "Row"),
-            Column::text("session", "Session"),
-            Column::number("error_mm", "Error", "mm", 3),
-            Column::number("robust_sigmas", "Size", "robust σ", 1),
-        ],
-    );
-    for Outlier { index, robust_sigmas, error_mm } in found.outliers.rows.iter().copied() {
-        let row = dataset.rows.get(index);
-        table.push([
-            row_number(dataset, index).into(),
-            row.and_then(|row| row.session().map(str::to_owned)).into(),
-            error_mm.abs().into(),
-            robust_sigmas.into(),
-        ]);
-    }
+    let session = |outlier: &Outlier| dataset.rows.get(outlier.index).and_then(|row| row.session());
+    let mut table = Table::of("Rows set aside", &found.outliers.rows)
+        .count("row", "Row", |outlier| row_number(dataset, outlier.index))
+        .text("session", "Session", |outlier| session(outlier).map(str::to_owned))
+        .number("error_mm", "Error", "mm", 3, |outlier| outlier.error_mm.abs())
+        .number("robust_sigmas", "Size", "robust σ", 1, |outlier| outlier.robust_sigmas)
+        .table();
     if table.rows.iter().all(|row| row[1] == Cell::Missing) {
-        table.columns.remove(1);
-        table.rows.iter_mut().for_each(|row| {
-            row.remove(1);
-        });
+        table.remove_column(1);
     }
     table.notes.push(format!(
         "Beyond {OUTLIER_CUT} robust standard deviations of a robust fit of geometry. Rows are numbered as in the spreadsheet."

@@ -124,39 +124,22 @@ pub(super) fn verdict(study: &Study) -> PageVerdict {
 /// Each least-squares method as limited and after convergence.
 pub(super) fn convergence(study: &Study) -> Table {
     let rows = study.results.iter().filter_map(|result| Some((result, result.converged.as_ref()?)));
-    let mut table = Table::of(
-        title(study, "Stopped and converged"),
-        &rows.collect::<Vec<_>>(),
-        [
-            (Column::text("id", ""), |(result, _)| result.method.id.as_str().into()),
-            (Column::number("rmse_mm", "RMSE as limited", "mm", 4), |(result, _)| {
-                mean_rmse(&result.outcomes)
-            }),
-            (Column::number("iterations", "iterations", "", 1), |(result, _)| {
-                iterations(&result.outcomes).into()
-            }),
-            (Column::number("converged_rmse_mm", "converged", "mm", 4), |(_, converged)| {
-                mean_rmse(converged)
-            }),
-            (Column::number("converged_iterations", "further steps", "", 1), |(_, converged)| {
-                iterations(converged).into()
-            }),
-            (Column::significant("farthest", "farthest", "", 2), |(_, converged)| {
-                (converged.iter().map(|o| o.farthest).sum::<f64>() / converged.len().max(1) as f64).into()
-            }),
-            (Column::text("converged_ended", "Ended"), |(_, converged)| ended(converged).into()),
-        ],
-    );
-    table.notes = vec![
-        "Converged: continued on the same cost without fixed damping or a decaying step size. Neither changes the stationary \
+    Table::of(title(study, "Stopped and converged"), rows)
+        .text("id", "", |(result, _)| result.method.id.as_str())
+        .number("rmse_mm", "RMSE as limited", "mm", 4, |(result, _)| mean_rmse(&result.outcomes))
+        .number("iterations", "iterations", "", 1, |(result, _)| iterations(&result.outcomes))
+        .number("converged_rmse_mm", "converged", "mm", 4, |(_, converged)| mean_rmse(converged))
+        .number("converged_iterations", "further steps", "", 1, |(_, converged)| iterations(converged))
+        .significant("farthest", "farthest", "", 2, |(_, converged)| {
+            converged.iter().map(|o| o.farthest).sum::<f64>() / converged.len().max(1) as f64
+        })
+        .text("converged_ended", "Ended", |(_, converged)| ended(converged))
+.note("Converged: continued on the same cost without fixed damping or a decaying step size. Neither changes the stationary \
          points, so the method itself would end here, often after thousands more iterations along poorly determined \
-         directions. Ended: also states if a method had not converged after 5,000 further steps."
-            .to_owned(),
-        "farthest: largest final deviation of a link parameter from the data sheet, in manufacturing tolerances, mean over \
-         the cases. A deviation of tens of tolerances fits the rows with a physically implausible arm."
-            .to_owned(),
-    ];
-    table
+         directions. Ended: also states if a method had not converged after 5,000 further steps.")
+.note("farthest: largest final deviation of a link parameter from the data sheet, in manufacturing tolerances, mean over \
+         the cases. A deviation of tens of tolerances fits the rows with a physically implausible arm.")
+.table()
 }
 
 /// Mean held-out RMSE, or "diverged" if a case diverged.
@@ -169,33 +152,21 @@ fn mean_rmse(outcomes: &[Outcome]) -> Cell {
 pub(super) fn cost(study: &Study) -> Table {
     let rows =
         study.results.iter().map(|result| (result, passes(study, result), iterations(&result.outcomes)));
-    let mut table = Table::of(
-        title(study, "Budget of each method"),
-        &rows.collect::<Vec<_>>(),
-        [
-            (Column::text("id", ""), |(result, ..)| result.method.id.as_str().into()),
-            (Column::text("solver", "Solver"), |(result, ..)| result.solver.name.into()),
-            (Column::text("treatment", "Treatment"), |(result, ..)| treatment(result).into()),
-            (Column::number("iterations", "iterations", "", 1), |(.., n)| (*n).into()),
-            (Column::number("residual_passes", "residuals", "", 0), |(_, passes, _)| passes.0.into()),
-            (Column::number("residual_passes_per_iteration", "each", "", 1), |(_, passes, n)| {
-                (passes.0 / n).into()
-            }),
-            (Column::number("jacobian_passes", "Jacobians", "", 0), |(_, passes, _)| passes.1.into()),
-            (Column::number("jacobian_passes_per_iteration", "each", "", 1), |(_, passes, n)| {
-                (passes.1 / n).into()
-            }),
-            (Column::text("ended", "Ended"), |(result, ..)| ended(&result.outcomes).into()),
-        ],
-    );
-    table.notes = vec![
-        "residuals, Jacobians: passes over the rows of the fit, mean over the cases; each: passes per iteration. \
+    Table::of(title(study, "Budget of each method"), rows)
+        .text("id", "", |(result, ..)| result.method.id.as_str())
+        .text("solver", "Solver", |(result, ..)| result.solver.name)
+        .text("treatment", "Treatment", |(result, ..)| treatment(result))
+        .number("iterations", "iterations", "", 1, |(.., n)| *n)
+        .number("residual_passes", "residuals", "", 0, |(_, passes, _)| passes.0)
+        .number("residual_passes_per_iteration", "each", "", 1, |(_, passes, n)| passes.0 / n)
+        .number("jacobian_passes", "Jacobians", "", 0, |(_, passes, _)| passes.1)
+        .number("jacobian_passes_per_iteration", "each", "", 1, |(_, passes, n)| passes.1 / n)
+        .text("ended", "Ended", |(result, ..)| ended(&result.outcomes))
+.note("residuals, Jacobians: passes over the rows of the fit, mean over the cases; each: passes per iteration. \
          ukf-vslm-2023 Table VII gives Θ(iterations × rows) for every method; the counted constants differ by orders of \
          magnitude. LTLM takes two Jacobians and 2M evaluations per iteration; an iteration of a filter is a sweep, of a \
-         swarm a generation."
-            .to_owned(),
-    ];
-    table
+         swarm a generation.")
+.table()
 }
 
 /// Measured seconds.
@@ -238,32 +209,21 @@ pub(crate) fn times(study: &Study) -> Table {
 
 pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
     let rows = parameters.rows.iter().map(|row| (row, display_unit(row.parameter.unit())));
-    let mut table = Table::of(
-        format!("Link parameters by {} {}", parameters.id, parameters.name),
-        &rows.collect::<Vec<_>>(),
-        [
-            (Column::text("parameter", "Parameter"), |(row, _)| row.parameter.to_string().into()),
-            (Column::text("unit", "Unit"), |(_, (_, unit))| (*unit).into()),
-            (Column::number("nominal", "nominal", "", 3), |(row, (scale, _))| (row.nominal * scale).into()),
-            (Column::number("compensated", "compensated", "", 3), |(row, (scale, _))| {
-                ((row.nominal + row.deviation) * scale).into()
-            }),
-            (Column::significant("deviation", "deviation", "", 2), |(row, (scale, _))| {
-                Cell::with_sigma(row.deviation * scale, Some(row.sigma * scale))
-            }),
-            (Column::number("paper_deviation", "paper", "", 3), |(row, (scale, _))| {
-                row.paper.map(|v| v * scale).into()
-            }),
-            (Column::number("determined", "from the data", "", 2), |(row, _)| row.determined.into()),
-            (Column::text("observable", "Observable"), |(row, _)| {
-                if row.is_observable() { "yes" } else { "no" }.into()
-            }),
-        ],
-    );
-    table.notes = vec![
-        "compensated: nominal plus deviation, as entered in a controller; ± is 1σ of the deviation."
-            .to_owned(),
-    ];
+    let mut table = Table::of(format!("Link parameters by {} {}", parameters.id, parameters.name), rows)
+        .text("parameter", "Parameter", |(row, _)| row.parameter.to_string())
+        .text("unit", "Unit", |(_, (_, unit))| *unit)
+        .number("nominal", "nominal", "", 3, |(row, (scale, _))| row.nominal * scale)
+        .number("compensated", "compensated", "", 3, |(row, (scale, _))| {
+            (row.nominal + row.deviation) * scale
+        })
+        .significant("deviation", "deviation", "", 2, |(row, (scale, _))| {
+            Cell::with_sigma(row.deviation * scale, Some(row.sigma * scale))
+        })
+        .number("paper_deviation", "paper", "", 3, |(row, (scale, _))| row.paper.map(|v| v * scale))
+        .number("determined", "from the data", "", 2, |(row, _)| row.determined)
+        .text("observable", "Observable", |(row, _)| if row.is_observable() { "yes" } else { "no" })
+        .note("compensated: nominal plus deviation, as entered in a controller; ± is 1σ of the deviation.")
+        .table();
     if parameters.rows.iter().any(|row| row.paper.is_some()) {
         table.notes.push(
             "paper: the printed deviation for this method, on the paper's arm and rows; no target, since its rows do not \
