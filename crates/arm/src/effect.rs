@@ -7,10 +7,14 @@
 pub mod bending;
 pub mod compliance;
 pub mod lumped_compliance;
+pub mod hardening;
+pub mod torque_powers;
+pub mod joint_load;
 pub mod harmonic;
 pub mod error_map;
 pub mod gear_ratio;
 pub mod coupling;
+pub mod two_joint_gear;
 pub mod backlash;
 pub mod thermal;
 pub mod smooth_correction;
@@ -27,10 +31,13 @@ use self::compliance::Compliance;
 use self::coupling::Coupling;
 use self::error_map::ErrorMap;
 use self::gear_ratio::GearRatio;
+use self::hardening::Hardening;
 use self::harmonic::Harmonic;
 use self::lumped_compliance::LumpedCompliance;
 use self::smooth_correction::SmoothCorrection;
 use self::thermal::Thermal;
+use self::torque_powers::TorquePowers;
+use self::two_joint_gear::TwoJointGear;
 use crate::condition::Condition;
 use crate::joints::MappedJoints;
 use truegrind_math::lanes::SinCos;
@@ -47,6 +54,11 @@ pub enum Effect {
     /// The same where masses or gravity's direction are unknown.
     #[serde(rename = "joint-compliance-lumped")]
     LumpedCompliance(LumpedCompliance),
+    /// A joint that stiffens under its load.
+    JointStiffness(Hardening),
+    /// A joint whose deflection is not in proportion to its torque, by an unknown law.
+    #[serde(rename = "joint-stiffness-powers")]
+    TorquePowers(TorquePowers),
     /// A link that bends between two parallel axes.
     LinkBending(Bending),
     /// An eccentric gear: once or twice per joint turn.
@@ -58,6 +70,8 @@ pub enum Effect {
     GearMap(ErrorMap),
     /// A gear whose ratio is not the nominal one.
     GearRatio(GearRatio),
+    /// An error of a joint that depends on its own angle and on another's.
+    GearTwoJoints(TwoJointGear),
     /// A joint that moves along with another.
     JointCoupling(Coupling),
     /// Play that depends on the side from which the joint came.
@@ -73,10 +87,13 @@ macro_rules! each {
         match $self {
             Effect::JointCompliance($e) => $body,
             Effect::LumpedCompliance($e) => $body,
+            Effect::JointStiffness($e) => $body,
+            Effect::TorquePowers($e) => $body,
             Effect::LinkBending($e) => $body,
             Effect::GearMap($e) => $body,
             Effect::GearEccentricity($e) | Effect::GearTransmission($e) => $body,
             Effect::GearRatio($e) => $body,
+            Effect::GearTwoJoints($e) => $body,
             Effect::JointCoupling($e) => $body,
             Effect::Backlash($e) => $body,
             Effect::ThermalDrift($e) => $body,
@@ -90,10 +107,12 @@ impl Effect {
     pub fn name(&self) -> &'static str {
         match self {
             Effect::JointCompliance(_) | Effect::LumpedCompliance(_) => "joint-compliance",
+            Effect::JointStiffness(_) | Effect::TorquePowers(_) => "joint-stiffness",
             Effect::LinkBending(_) => "link-bending",
             Effect::GearEccentricity(_) => "gear-eccentricity",
             Effect::GearTransmission(_) | Effect::GearMap(_) => "gear-transmission",
             Effect::GearRatio(_) => "gear-ratio",
+            Effect::GearTwoJoints(_) => "gear-two-joints",
             Effect::JointCoupling(_) => "joint-coupling",
             Effect::Backlash(_) => "backlash",
             Effect::ThermalDrift(_) => "thermal-drift",
@@ -115,6 +134,8 @@ impl Effect {
     pub fn holds_for_one_load(&self) -> bool {
         matches!(self, Effect::LumpedCompliance(_))
             || matches!(self, Effect::LinkBending(bending) if bending.frame.is_some())
+            || matches!(self, Effect::JointStiffness(spring) if !spring.mass.is_empty())
+            || matches!(self, Effect::TorquePowers(powers) if !powers.mass.is_empty())
     }
 
     /// Whether all its parameters are 0: it changes nothing and is listed for the covariance alone.
@@ -154,11 +175,14 @@ impl Effect {
     ) {
         match self {
             Effect::LumpedCompliance(e) => e.add_offset(statics, u, out),
+            Effect::JointStiffness(e) => e.add_offset(statics, u, torque, out),
+            Effect::TorquePowers(e) => e.add_offset(statics, u, torque, out),
             Effect::LinkBending(e) => e.add_offset(statics, u, torque, out),
             Effect::GearMap(e) => e.add_offset(u, out),
             Effect::JointCompliance(e) => e.add_offset(torque, out),
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.add_offset(u, out),
             Effect::GearRatio(e) => e.add_offset(u, out),
+            Effect::GearTwoJoints(e) => e.add_offset(u, out),
             Effect::JointCoupling(e) => e.add_offset(u, out),
             Effect::Backlash(e) => e.add_offset(condition, out),
             Effect::SmoothCorrection(e) => e.add_offset(u, out),
@@ -173,11 +197,14 @@ impl Effect {
         match self {
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.add_jacobian_product(u, step, out),
             Effect::GearRatio(e) => e.add_jacobian_product(step, out),
+            Effect::GearTwoJoints(e) => e.add_jacobian_product(u, step, out),
             Effect::JointCoupling(e) => e.add_jacobian_product(step, out),
             Effect::SmoothCorrection(e) => e.add_jacobian_product(u, step, out),
             Effect::GearMap(e) => e.add_jacobian_product(u, step, out),
             Effect::JointCompliance(_)
             | Effect::LumpedCompliance(_)
+            | Effect::JointStiffness(_)
+            | Effect::TorquePowers(_)
             | Effect::LinkBending(_)
             | Effect::Backlash(_)
             | Effect::ThermalDrift(_) => {}
@@ -188,6 +215,8 @@ impl Effect {
     pub fn needs_torque(&self) -> bool {
         match self {
             Effect::JointCompliance(_) => true,
+            Effect::JointStiffness(spring) => spring.mass.is_empty(),
+            Effect::TorquePowers(powers) => powers.mass.is_empty(),
             Effect::LinkBending(bending) => bending.frame.is_none(),
             _ => false,
         }

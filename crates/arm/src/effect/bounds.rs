@@ -3,6 +3,7 @@
 use super::Effect;
 use super::bending::Bending;
 use super::error_map::ErrorMap;
+use super::joint_load::PointMass;
 use super::lumped_compliance::LumpedCompliance;
 use super::smooth_correction::SmoothCorrection;
 use super::thermal::Thermal;
@@ -15,6 +16,8 @@ const SHARE: Bound = Bound::new(-0.5, 0.5, "a share within ±0.5");
 /// Torsional compliance, lumped masses in it or not.
 const COMPLIANCE: Bound =
     Bound::new(-1.0, 1.0, "a compliance in rad/(N m), times kg where masses are lumped, within ±1");
+const MASS_KG: Bound = Bound::new(0.0, 1e5, "a mass in kg, not negative");
+const TORQUE_NM: Bound = Bound::new(1e-6, 1e6, "a torque in N m, above 0");
 const ORDER: Bound = Bound::new(1e-3, 1e5, "periods per turn of the joint, above 0");
 const GROWTH: Bound = Bound::new(-0.1, 0.1, "a relative growth within ±0.1");
 const TIME_H: Bound = Bound::new(1e-6, 1e6, "a time in hours, above 0");
@@ -45,6 +48,22 @@ impl Effect {
             }
             Effect::GearMap(e) => knots(e),
             Effect::GearRatio(e) => SHARE.check(|| "error".to_owned(), e.error),
+            Effect::JointStiffness(e) => {
+                masses(e.joint, &e.mass)?;
+                TORQUE_NM.check(|| "half_nm".to_owned(), e.half_nm)?;
+                OFFSET_RAD.check(|| "deflection_rad".to_owned(), e.deflection_rad)
+            }
+            Effect::TorquePowers(e) => {
+                masses(e.joint, &e.mass)?;
+                TORQUE_NM.check(|| "largest_nm".to_owned(), e.largest_nm)?;
+                COMPLIANCE.check(|| "square_rad_per_nm2".to_owned(), e.square_rad_per_nm2)?;
+                COMPLIANCE.check(|| "cube_rad_per_nm3".to_owned(), e.cube_rad_per_nm3)
+            }
+            Effect::GearTwoJoints(e) => {
+                joint("other", e.other)?;
+                OFFSET_RAD.check_all("sum_rad", &e.sum_rad)?;
+                OFFSET_RAD.check_all("difference_rad", &e.difference_rad)
+            }
             Effect::JointCoupling(e) => {
                 joint("driver", e.driver)?;
                 SHARE.check(|| "factor".to_owned(), e.factor)
@@ -93,6 +112,18 @@ fn lumps(load: &LumpedCompliance) -> Result<(), InvalidValue> {
             }
         }
         COMPLIANCE.check(|| "lump.factor".to_owned(), lump.factor)?;
+    }
+    Ok(())
+}
+
+fn masses(joint: usize, masses: &[PointMass]) -> Result<(), InvalidValue> {
+    count("mass", masses.len(), 0, "up to 10,000 masses")?;
+    for mass in masses {
+        if !(joint + 1..=6).contains(&mass.frame) {
+            let expected = "a frame beyond the joint, to 6";
+            return Err(InvalidValue::new("mass.frame", mass.frame.to_string(), expected));
+        }
+        MASS_KG.check(|| "mass.mass_kg".to_owned(), mass.mass_kg)?;
     }
     Ok(())
 }

@@ -11,10 +11,14 @@ use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
 use truegrind_arm::effect::error_map::ErrorMap;
 use truegrind_arm::effect::gear_ratio::GearRatio;
+use truegrind_arm::effect::hardening::Hardening;
 use truegrind_arm::effect::harmonic::Harmonic;
+use truegrind_arm::effect::joint_load::PointMass;
 use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
 use truegrind_arm::effect::smooth_correction::SmoothCorrection;
 use truegrind_arm::effect::thermal::Thermal;
+use truegrind_arm::effect::torque_powers::TorquePowers;
+use truegrind_arm::effect::two_joint_gear::TwoJointGear;
 use truegrind_arm::link::{Link, LinkModel};
 use truegrind_arm::model::{Body, Joints, Limits, Model};
 use truegrind_math::se3::Pose;
@@ -423,6 +427,21 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
     out.effects.push(Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump: lump.to_vec() }));
     for (joint, frame) in [(1, None), (1, Some(4)), (2, Some(6))] {
         out.effects.push(Effect::LinkBending(Bending { joint, frame, compliance_rad_per_nm: 2e-6 }));
+    }
+    out.effects.push(Effect::GearTwoJoints(TwoJointGear {
+        joint: 4,
+        other: 3,
+        orders: [2, 1],
+        sum_rad: [1e-4, -5e-5],
+        difference_rad: [2e-5, 8e-5],
+    }));
+    for mass in [Vec::new(), vec![PointMass { frame: 2, mass_kg: 0.8 }, PointMass { frame: 4, mass_kg: 0.2 }]]
+    {
+        let spring = Hardening { joint: 1, mass: mass.clone(), half_nm: 10.0, deflection_rad: 3e-5 };
+        let largest_nm = if mass.is_empty() { 15.0 } else { 2.0 };
+        let (square_rad_per_nm2, cube_rad_per_nm3) = (3e-8, -1e-9);
+        let powers = TorquePowers { joint: 2, mass, largest_nm, square_rad_per_nm2, cube_rad_per_nm3 };
+        out.effects.extend([Effect::JointStiffness(spring), Effect::TorquePowers(powers)]);
     }
     out.effects.push(Effect::GearRatio(GearRatio { joint: 5, error: 2e-4 }));
     out.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));

@@ -282,9 +282,20 @@ impl LoggedColumns {
     }
 }
 
-/// Couplings (driver, joint) of common gear trains: wrist, and forearm linkage.
-const COUPLINGS: [(usize, usize); 10] =
-    [(3, 4), (3, 5), (4, 5), (4, 3), (5, 4), (5, 3), (1, 2), (2, 1), (2, 3), (0, 1)];
+/// Couplings (driver, joint, variants): of the common gear trains of wrist and forearm linkage, and of two pairs that hardly any gear train
+/// joins, which have the odds of several variants.
+const COUPLINGS: [(usize, usize, f64); 10] = [
+    (3, 4, 1.0),
+    (3, 5, 1.0),
+    (4, 5, 1.0),
+    (4, 3, 1.0),
+    (5, 4, 1.0),
+    (5, 3, 1.0),
+    (1, 2, 1.0),
+    (2, 1, 1.0),
+    (2, 3, 5.0),
+    (0, 1, 5.0),
+];
 
 /// Fine error maps for the periods of a reducer's stages, tried where the order spectrum has peaks in their range: knots, and the
 /// highest resolved order (a cubic spline needs nearly two and a half knots per period).
@@ -369,8 +380,8 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         let all = lumps.into_iter().chain(wrist).chain(moments).collect();
         effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: all }), 1.0));
     }
-    for (driver, joint) in COUPLINGS.into_iter().filter(|&(driver, _)| moves(driver)) {
-        effects.push((Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 }), 1.0));
+    for (driver, joint, tried) in COUPLINGS.into_iter().filter(|&(driver, ..)| moves(driver)) {
+        effects.push((Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 }), tried));
     }
     for joint in (0..6).filter(|&j| columns.approach[j]) {
         effects.push((Effect::Backlash(Backlash { joint, play_rad: 0.0 }), 1.0));
@@ -527,34 +538,55 @@ fn assumed_loads(joint: usize) -> &'static [AssumedLoad] {
 /// Shares of the largest torque of the rows at which a joint that stiffens has yielded by half.
 const BENDS: [f64; 2] = [0.1, 0.3];
 
-/// Joints that stiffen under their load, with the number of variants.
-fn hardening(subject: &Subject<'_>, joint: usize, loads: &[AssumedLoad]) -> Vec<(EmpiricalFault, f64)> {
-    let tried = (BENDS.len() * loads.len()) as f64;
-    let variants = loads.iter().flat_map(|&load| {
-        let torques = torques_under(&subject.observed.dataset, subject.nominal, load);
-        let largest = torques.iter().map(|t| t[joint].abs()).fold(0.0, f64::max);
+/// Up to where powers of a torque count, as a share of the largest torque of the rows.
+const BEYOND: f64 = 1.1;
+
+/// Torque at which half of a play is closed, as a share of the largest: a step for the rows, and yet a slope that a solver can follow.
+const CLOSED: f64 = 0.01;
+
+/// A share of the largest torque of the rows about a joint (mN m), to two digits: one row more must not change a fault.
+fn torque_mnm(subject: &Subject<'_>, joint: usize, load: AssumedLoad, share: f64) -> u32 {
+    let torques = torques_under(&subject.observed.dataset, subject.nominal, load);
+    let largest = torques.iter().map(|t| t[joint].abs()).fold(0.0, f64::max);
+    let torque = (1e3 * share * largest).max(1.0);
+    let unit = 10_f64.powf(torque.log10().floor() - 1.0).max(1.0);
+    ((torque / unit).round() * unit) as u32
+}
+
+/// Springs of a joint that are not linear, with the number of variants.
+fn nonlinear_springs(
+    subject: &Subject<'_>,
+    joint: usize,
+    loads: &[AssumedLoad],
+) -> Vec<(EmpiricalFault, f64)> {
+    let torque = |load, share| torque_mnm(subject, joint, load, share);
+    let by_powers = loads.iter().map(|&load| {
+        let largest_mnm = torque(load, BEYOND);
+        (EmpiricalFault::NonlinearStiffness { joint, load, largest_mnm }, loads.len() as f64)
+    });
+    let hardening = loads.iter().flat_map(|&load| {
         BENDS.map(|share| {
-            // To two digits: one row more must not change the fault.
-            let bend = (1e3 * share * largest).max(1.0);
-            let unit = 10_f64.powf(bend.log10().floor() - 1.0).max(1.0);
-            EmpiricalFault::Hardening { joint, load, bend_mnm: ((bend / unit).round() * unit) as u32 }
+            let bend_mnm = torque(load, share);
+            (EmpiricalFault::Hardening { joint, load, bend_mnm }, (BENDS.len() * loads.len()) as f64)
         })
     });
-    variants.map(|fault| (fault, tried)).collect()
+    by_powers.chain(hardening).collect()
 }
 
 /// Play that its load closes, of joints that gravity loads, with the number of variants of each: where the centre of mass of what a joint
 /// carries is, is not known, so that it is put at elbow, wrist or flange.
-fn loaded_plays(nominal: &Model, moves: &dyn Fn(usize) -> bool) -> Vec<(EmpiricalFault, f64)> {
-    (1..5)
-        .filter(|&joint| moves(joint))
-        .flat_map(|joint| {
-            let known = nominal.bodies.is_some().then_some(AssumedLoad::Masses);
-            let all: Vec<AssumedLoad> = assumed_loads(joint).iter().copied().chain(known).collect();
-            let tried = all.len() as f64;
-            all.into_iter().map(move |load| (EmpiricalFault::LoadedPlay { joint, load }, tried))
-        })
-        .collect()
+fn loaded_plays(subject: &Subject<'_>, moves: &dyn Fn(usize) -> bool) -> Vec<(EmpiricalFault, f64)> {
+    let known = subject.nominal.bodies.is_some().then_some(AssumedLoad::Masses);
+    let of_joint = |joint: usize| {
+        let all: Vec<AssumedLoad> = assumed_loads(joint).iter().copied().chain(known).collect();
+        let tried = all.len() as f64;
+        let play = move |load| {
+            let closed_mnm = torque_mnm(subject, joint, load, CLOSED);
+            (EmpiricalFault::LoadedPlay { joint, load, closed_mnm }, tried)
+        };
+        all.into_iter().map(play)
+    };
+    (1..5).filter(|&joint| moves(joint)).flat_map(of_joint).collect()
 }
 
 /// Two-joint gear errors of neighbours that move, with the number of variants of each. Only first orders where the axes are parallel:
@@ -656,15 +688,16 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     let wobble = |joint| [false, true].map(|radial| (EmpiricalFault::AxisWobble { joint, radial }, 2.0));
     out.extend((0..6).filter(|&joint| moves(joint)).flat_map(wobble));
     let exact = out.len();
-    out.push((EmpiricalFault::NonlinearStiffness { joint: 0, load: AssumedLoad::Masses }, 1.0));
+    let known = subject.nominal.bodies.is_some();
+    // About an upright axis gravity has no torque: the first joint has a spring only in an arm that leans.
+    let first = if known { AssumedLoad::Masses } else { AssumedLoad::Frame(6) };
+    let largest_mnm = torque_mnm(subject, 0, first, BEYOND);
+    out.push((EmpiricalFault::NonlinearStiffness { joint: 0, load: first, largest_mnm }, 1.0));
     for joint in (1..5).filter(|&joint| moves(joint)) {
-        let known = subject.nominal.bodies.is_some();
         let loads = if known { &[AssumedLoad::Masses] } else { assumed_loads(joint) };
-        let tried = loads.len() as f64;
-        out.extend(loads.iter().map(|&load| (EmpiricalFault::NonlinearStiffness { joint, load }, tried)));
-        out.extend(hardening(subject, joint, loads));
+        out.extend(nonlinear_springs(subject, joint, loads));
     }
-    out.extend(loaded_plays(subject.nominal, &moves));
+    out.extend(loaded_plays(subject, &moves));
     out.extend(two_joint_gears(subject.nominal, &moves));
     if dataset.sensor == Sensor::Cable {
         out.extend([(EmpiricalFault::Pulley, 1.0), (drum(dataset), 1.0)]);

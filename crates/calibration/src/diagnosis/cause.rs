@@ -90,6 +90,7 @@ impl Cause {
     pub fn joints(&self) -> Vec<usize> {
         match self {
             Cause::Arm(Effect::JointCoupling(c)) => vec![c.driver, c.joint],
+            Cause::Arm(Effect::GearTwoJoints(gear)) => vec![gear.joint, gear.other],
             Cause::Arm(Effect::LinkBending(b)) => vec![b.joint],
             Cause::Arm(effect) => effect.joint().into_iter().collect(),
             Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.joints(),
@@ -151,26 +152,36 @@ impl Cause {
         }
     }
 
-    /// What of it a model file can carry where it is in the arm and no file has a place for it, at size 0: of a base that tilts what a
-    /// second joint that yields does, since its axis is horizontal and its torque differs from the overturning moment by a constant.
+    /// The effect of the arm that an empirical fault of it is, at size 0; `None` for faults that no model file can carry.
+    pub fn effect(&self) -> Option<Effect> {
+        match self {
+            Cause::Measurement(Disturbance {
+                kind: Kind::Empirical(fault),
+                profile: Profile::Constant,
+                ..
+            }) => fault.effect(),
+            _ => None,
+        }
+    }
+
+    /// What of a fault of the arm a model file can carry, at size 0: the effect that it is, and of a base that tilts what a second joint
+    /// that yields does, since its axis is horizontal and its torque differs from the overturning moment by a constant.
     pub fn stand_in(&self) -> Option<Self> {
-        let Cause::Measurement(Disturbance {
-            kind: Kind::Empirical(EmpiricalFault::BaseTilt { load, .. }),
-            ..
-        }) = self
-        else {
-            return None;
-        };
-        let effect = match load {
-            Overturning::Masses => {
-                Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: 0.0 })
-            }
-            Overturning::Lumps => {
-                let lump = |frame| Lump { frame, axis: None, moment: None, factor: 0.0 };
-                Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump: [2, 4, 6].map(lump).to_vec() })
+        let in_part = || {
+            let Cause::Measurement(Disturbance { kind, .. }) = self else { return None };
+            match kind {
+                Kind::Empirical(EmpiricalFault::BaseTilt { load: Overturning::Masses, .. }) => {
+                    Some(Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: 0.0 }))
+                }
+                Kind::Empirical(EmpiricalFault::BaseTilt { load: Overturning::Lumps, .. }) => {
+                    let lump = |frame| Lump { frame, axis: None, moment: None, factor: 0.0 };
+                    let lump = [2, 4, 6].map(lump).to_vec();
+                    Some(Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump }))
+                }
+                _ => None,
             }
         };
-        Some(Cause::Arm(effect))
+        self.effect().or_else(in_part).map(Cause::Arm)
     }
 
     /// Whether it varies slowly with the joint angles, like the residue of an unknown fault.
@@ -281,9 +292,13 @@ impl Cause {
             _ => *self.joints().first()?,
         };
         let part = match self {
-            Cause::Arm(Effect::JointCompliance(_) | Effect::LumpedCompliance(_) | Effect::LinkBending(_)) => {
-                Part::Spring
-            }
+            Cause::Arm(
+                Effect::JointCompliance(_)
+                | Effect::LumpedCompliance(_)
+                | Effect::JointStiffness(_)
+                | Effect::TorquePowers(_)
+                | Effect::LinkBending(_),
+            ) => Part::Spring,
             Cause::Arm(Effect::Backlash(_))
             | Cause::Measurement(Disturbance {
                 kind: Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),

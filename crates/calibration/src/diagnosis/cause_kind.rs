@@ -109,8 +109,7 @@ kinds! {
     /// A joint whose stiffness is not linear.
     JointStiffness = "joint-stiffness",
         pattern: "the residual about joint {joint} follows its torque, but not in proportion",
-        remedy: "measure this joint with and without load, approached under the same torque; the written model includes only the \
-            linear part";
+        remedy: "measure this joint with and without load, approached under the same torque";
     /// A joint whose zero moved: lost counts, a slipped belt, another mastering.
     JointZeroShift = "joint-zero-shift",
         pattern: "the residual about joint {joint} steps by one angle in these rows",
@@ -211,6 +210,8 @@ impl From<&Effect> for CauseKind {
             Effect::GearEccentricity(_) => CauseKind::GearEccentricity,
             Effect::GearTransmission(_) | Effect::GearMap(_) => CauseKind::GearTransmission,
             Effect::GearRatio(_) => CauseKind::GearRatio,
+            Effect::JointStiffness(_) | Effect::TorquePowers(_) => CauseKind::JointStiffness,
+            Effect::GearTwoJoints(_) => CauseKind::GearTwoJoints,
             Effect::JointCoupling(_) => CauseKind::JointCoupling,
             Effect::Backlash(_) => CauseKind::Backlash,
             Effect::ThermalDrift(_) => CauseKind::ThermalDrift,

@@ -137,8 +137,8 @@ pub fn diagnose(
     for (k, finding) in diagnosis.findings.iter_mut().enumerate() {
         let own = (0..finding_of_cause.len()).filter(|&cause| finding_of_cause[cause] == k);
         let effects = own.filter_map(|cause| match &search.searched_fit.causes[cause] {
-            Cause::Arm(effect) => Some(effect),
-            Cause::Measurement(_) => None,
+            Cause::Arm(effect) => Some(effect.clone()),
+            fault => fault.effect(),
         });
         say_whether_corrected(finding, effects, &estimated);
     }
@@ -158,16 +158,16 @@ pub fn diagnose(
 
 /// States whether the written arm has the `effects` of a finding, and what to do where it has not: an effect of size 0 corrects nothing. A
 /// finding bears the name of its first effect; of further terms those that are not certain may be missing.
-fn say_whether_corrected<'a>(
+fn say_whether_corrected(
     finding: &mut Finding,
-    mut effects: impl Iterator<Item = &'a Effect>,
+    mut effects: impl Iterator<Item = Effect>,
     estimated: &Estimated,
 ) {
     if finding.effect == CauseKind::SmallDisturbances {
         return;
     }
-    let is_written = |effect: &Effect| {
-        estimated.model.effects.iter().any(|other| is_same_effect(effect, other) && !other.is_zero())
+    let is_written = |effect: Effect| {
+        estimated.model.effects.iter().any(|other| is_same_effect(&effect, other) && !other.is_zero())
     };
     let Some(corrected) = effects.next().map(is_written) else { return };
     finding.corrected = Some(corrected);

@@ -10,8 +10,8 @@
 //! without it; only its name is uncertain. The difference x₁ − x₀ includes the compensating changes of links and causes, so that at
 //! the measured poses it is no more than the causes explain there.
 //!
-//! Empirical faults of the arm (nonlinear stiffness, two-joint gear errors) have no representation in a model file. The best rival
-//! that has one represents them: it explains nearly the same of the rows.
+//! Most empirical faults of the arm are effects that a model file has. Of an axis that wobbles the best rival that a file can carry represents
+//! it: it explains nearly the same of the rows.
 //!
 //! What that rival leaves is missing too: without a rival, all that the links have not absorbed. It is known from the fit that has it, but
 //! not as a function that a file can carry. A harmonic of its joint with size 0 stands for it, sine and cosine of the variance s² each, so
@@ -150,11 +150,13 @@ const ORDERS: [f64; 2] = [1.0, 2.0];
 
 /// The joint (0-based) of a cause of the arm that no model file can represent, or of what stands in for it.
 fn joint_without_file(cause: &Cause) -> Option<usize> {
-    let carried_by = || match cause.stand_in() {
+    if !has_no_model_representation(cause) || cause.effect().is_some() {
+        return None;
+    }
+    match cause.stand_in() {
         Some(stand_in) => stand_in.joints().first().copied(),
         None => cause.joints().first().copied(),
-    };
-    has_no_model_representation(cause).then(carried_by).flatten()
+    }
 }
 
 /// Adds missing joint errors to an arm, for its covariance alone.

@@ -136,6 +136,8 @@ pub fn describe_cause(
         Cause::Arm(Effect::LumpedCompliance(_)) => {
             format!("joint {joint} deflects under gravity with masses that differ from the data sheet")
         }
+        Cause::Arm(Effect::JointStiffness(_)) => stiffens(joint, value),
+        Cause::Arm(Effect::TorquePowers(_)) => is_nonlinear(joint),
         // c = L/EI turns the link's end by a third of it under a force whose torque at the root is 1 N m.
         Cause::Arm(Effect::LinkBending(b)) if b.frame.is_none() => format!(
             "link {joint} bends: each N m at its root moves what is 1 m away by {:.1} µm",
@@ -171,6 +173,7 @@ pub fn describe_cause(
             c.driver + 1,
             value * 100.0
         ),
+        Cause::Arm(Effect::GearTwoJoints(gear)) => depends_on_two(joint, gear.other),
         Cause::Arm(Effect::Backlash(_)) if value < 0.0 => format!(
             "joint {joint} stops {:.4}° higher when approached from below than from above: it overshoots, or the signs in column approach{joint} \
              are exchanged (-1 is from below)",
@@ -305,23 +308,13 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
             "readings were taken before the sensor had settled: {:.2} % of the change from the previous reading remained",
             100.0 * value.abs()
         ),
-        EmpiricalFault::NonlinearStiffness { .. } => format!(
-            "the deflection of joint {joint} is not proportional to its torque: its stiffness is nonlinear, or it has backlash"
-        ),
-        EmpiricalFault::Hardening { .. } => format!(
-            "joint {joint} stiffens under its load: most of its deflection, up to {:.4}°, comes with the first newton metres",
-            value.to_degrees()
-        ),
+        EmpiricalFault::NonlinearStiffness { .. } => is_nonlinear(joint),
+        EmpiricalFault::Hardening { .. } => stiffens(joint, value),
         EmpiricalFault::LoadedPlay { .. } => format!(
             "joint {joint} has {:.4}° of backlash that gravity closes: the load decides which flank of the gear carries it",
             value.to_degrees()
         ),
-        EmpiricalFault::TwoJointGear { other, .. } => {
-            format!(
-                "the error of joint {joint} depends on its own angle and on the angle of joint {}",
-                other + 1
-            )
-        }
+        EmpiricalFault::TwoJointGear { other, .. } => depends_on_two(joint, other),
         EmpiricalFault::AxisWobble { .. } => format!(
             "the axis of joint {joint} wobbles by up to {:.4}° twice a turn, as in a bearing with races that are not flat",
             largest_tilt([0, 1, 2, 3].map(|k| value_of(parameters, k))).to_degrees()
@@ -408,6 +401,26 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
     }
 }
 
+/// Of a joint (from 1) with this deflection (rad).
+fn stiffens(joint: usize, deflection: f64) -> String {
+    format!(
+        "joint {joint} stiffens under its load: most of its deflection, up to {:.4}°, comes with the first newton metres",
+        deflection.to_degrees()
+    )
+}
+
+/// Of a joint (from 1) with another law.
+fn is_nonlinear(joint: usize) -> String {
+    format!(
+        "the deflection of joint {joint} is not proportional to its torque: its stiffness is nonlinear, or it has backlash"
+    )
+}
+
+/// Of a joint (from 1) whose error depends on another (from 0) too.
+fn depends_on_two(joint: usize, other: usize) -> String {
+    format!("the error of joint {joint} depends on its own angle and on the angle of joint {}", other + 1)
+}
+
 /// Largest tilt of an axis that tilts about x by a cos φ + b sin φ and about y by c cos φ + d sin φ: two circles, one that runs with φ and
 /// one against it.
 fn largest_tilt([a, b, c, d]: [f64; 4]) -> f64 {
@@ -432,7 +445,7 @@ pub fn describe_pattern(cause: &Cause) -> String {
 pub(super) fn remedy_of(cause: &Cause) -> &'static str {
     match cause.kind() {
         CauseKind::Backlash if cause.is_empirical() => {
-            "adjust the gear mesh; the written model leaves it out, so keep programs away from poses at which the load changes sides"
+            "adjust the gear mesh; keep programs away from poses at which the load changes sides"
         }
         CauseKind::SensorScale if cause.scale_step().is_some() => {
             "measure a known length with the sensor of these rows and with that of the others: no row tells which of them is right, and the \

@@ -137,11 +137,22 @@ pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
         // The same curve over more knots, each of them smaller.
         Effect::GearMap(map) => 0.05_f64.to_radians() * (24.0 / map.knots_rad.len().max(1) as f64).sqrt(),
         Effect::GearRatio(_) | Effect::JointCoupling(_) => 3e-3,
-        Effect::Backlash(_) => 0.2_f64.to_radians(),
+        Effect::TorquePowers(powers) => torque_power_sigma(powers.mass.is_empty(), parameter),
+        Effect::GearTwoJoints(_) => TWO_JOINT_SIGMA_RAD,
+        Effect::Backlash(_) | Effect::JointStiffness(_) => 0.2_f64.to_radians(),
         Effect::ThermalDrift(_) => GROWTH_SIGMA,
         Effect::SmoothCorrection(_) => SMOOTH_SIGMA_RAD,
     }
 }
+
+/// Priors of square and cube of a torque: relative to a compliance of 1e-5 rad/(N m) the same again at some 30 N m. Of 1 kg in place of some
+/// 10: per kg² and kg³.
+pub fn torque_power_sigma(has_masses: bool, parameter: usize) -> f64 {
+    if has_masses { [1e-6, 1e-7][parameter.min(1)] } else { 1e-4 }
+}
+
+/// Prior of an error that depends on two joints.
+pub const TWO_JOINT_SIGMA_RAD: f64 = 3e-4;
 
 /// Prior of relative thermal growth: aluminium by some 40 K.
 pub const GROWTH_SIGMA: f64 = 1e-3;

@@ -11,6 +11,7 @@ use crate::measurement::sensor::disturbance::Kind;
 use crate::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault, second_degree};
 
 use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
 use truegrind_arm::model::{Body, Model};
 
 /// Shifts of the sensor (mm), one for each parameter, from the row and the vector from sensor to target.
@@ -21,6 +22,10 @@ const HOUR_S: f64 = 3600.0;
 
 /// Rotation of each joint (rad) per unit of each parameter, row by row, of faults that rotate joints.
 fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
+    let is_step = matches!(fault, EmpiricalFault::LoadedPlay { .. });
+    if let Some(effect) = fault.effect().filter(|_| !is_step) {
+        return effect_rotations(&effect, dataset, model);
+    }
     let rows = &dataset.rows;
     let none = || -> [Option<Vec<f64>>; 6] { Default::default() };
     match fault {
@@ -49,25 +54,7 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 out
             })
             .collect(),
-        EmpiricalFault::NonlinearStiffness { joint, load } => {
-            let torques = torques_under(dataset, model, load);
-            [2, 3]
-                .map(|power: i32| {
-                    let mut out = none();
-                    let bent = |t: f64| t.abs().powi(power - 1) * t;
-                    out[joint] = Some(torques.iter().map(|t| bent(t[joint])).collect());
-                    out
-                })
-                .to_vec()
-        }
-        EmpiricalFault::Hardening { joint, load, bend_mnm } => {
-            let bend = f64::from(bend_mnm.max(1)) * 1e-3;
-            let mut out = none();
-            let yields = |t: f64| t / (t.abs() + bend);
-            out[joint] = Some(torques_under(dataset, model, load).iter().map(|t| yields(t[joint])).collect());
-            vec![out]
-        }
-        EmpiricalFault::LoadedPlay { joint, load } => {
+        EmpiricalFault::LoadedPlay { joint, load, .. } => {
             let torques = torques_under(dataset, model, load);
             let mut out = none();
             // A joint yields along its torque, so a play of p puts its link p/2 from the middle on that side.
@@ -75,37 +62,33 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
             out[joint] = Some(torques.iter().map(|t| flank(t[joint])).collect());
             vec![out]
         }
-        EmpiricalFault::TwoJointGear { joint, other, orders } => {
-            let [own, others] = orders.map(f64::from);
-            let angle = |r: &Row, sign: f64| {
-                let u = model.mapped(&r.joints);
-                own * u[joint] + sign * others * u[other]
-            };
-            [(1.0, true), (1.0, false), (-1.0, true), (-1.0, false)]
-                .map(|(sign, sine)| {
-                    let mut out = none();
-                    let wave = |a: f64| if sine { a.sin() } else { a.cos() };
-                    out[joint] = Some(rows.iter().map(|r| wave(angle(r, sign))).collect());
-                    out
-                })
-                .to_vec()
-        }
         _ => Vec::new(),
     }
 }
 
+/// The same of an effect of one joint.
+fn effect_rotations(effect: &Effect, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
+    let Some(joint) = effect.joint() else { return Vec::new() };
+    let statics = Model { effects: Vec::new(), ..model.clone() }.statics();
+    let mut out: Vec<[Option<Vec<f64>>; 6]> = vec![Default::default(); effect.parameters().len()];
+    for row in dataset.rows.iter() {
+        let turns = effect.regressors(&statics, &model.mapped(&row.joints), &row.condition);
+        for (column, turn) in out.iter_mut().zip(turns) {
+            column[joint].get_or_insert_default().push(turn[joint]);
+        }
+    }
+    out
+}
+
 /// Static torques (N m) of an assumed load.
 pub fn torques_under(dataset: &Dataset, model: &Model, load: AssumedLoad) -> Vec<Vector6<f64>> {
-    let end = |frame: usize| move |end: usize| f64::from(u8::from(end == frame));
-    match load {
-        AssumedLoad::Masses => torques(dataset, model),
-        AssumedLoad::Frame(frame) => torques_of_ends(dataset, model, end(usize::from(frame))),
-        AssumedLoad::ElbowAndWrist => torques_of_ends(dataset, model, |end| match end {
-            2 => 1.0 - AT_WRIST,
-            4 => AT_WRIST,
-            _ => 0.0,
-        }),
+    if load == AssumedLoad::Masses {
+        return torques(dataset, model);
     }
+    let masses = load.masses();
+    torques_of_ends(dataset, model, |end| {
+        masses.iter().find(|mass| mass.frame == end).map_or(0.0, |mass| mass.mass_kg)
+    })
 }
 
 /// Static torques (N m): of the arm's masses where these are known, otherwise of 1 kg at the flange.
@@ -118,10 +101,6 @@ fn torques(dataset: &Dataset, model: &Model) -> Vec<Vector6<f64>> {
         |r: &Row| Vector6::from(statics.torques::<f64>(&model.mapped(&r.joints).into(), &r.condition));
     dataset.rows.iter().map(torque).collect()
 }
-
-/// Share at the wrist, the origin of frame 4, of a load whose rest is at the elbow, that of frame 2. Of IRB 120, TX60 and UR10, each mass
-/// divided by the lever rule.
-const AT_WRIST: f64 = 0.2;
 
 /// Static torques (N m) of masses (kg) at the origins of the frames 1 to 6 alone.
 fn torques_of_ends(dataset: &Dataset, model: &Model, mass_kg: impl Fn(usize) -> f64) -> Vec<Vector6<f64>> {

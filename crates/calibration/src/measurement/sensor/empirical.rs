@@ -5,6 +5,13 @@
 //! evaluated at the nominal arm. They are rivals of the arm's effects, and nuisance parameters that no model file contains.
 
 use nalgebra::Vector3;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::hardening::Hardening;
+use truegrind_arm::effect::joint_load::PointMass;
+use truegrind_arm::effect::torque_powers::TorquePowers;
+use truegrind_arm::effect::two_joint_gear::TwoJointGear;
+
+use crate::identification::tolerance::{TWO_JOINT_SIGMA_RAD, torque_power_sigma};
 
 /// What loads a joint whose fault follows its static torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +23,24 @@ pub enum AssumedLoad {
     Frame(u8),
     /// 1 kg divided between elbow and wrist, as on the arms of the catalogue whose masses are known.
     ElbowAndWrist,
+}
+
+/// Share at the wrist, the origin of frame 4, of a load whose rest is at the elbow, that of frame 2. Of IRB 120, TX60 and UR10, each mass
+/// divided by the lever rule.
+const AT_WRIST: f64 = 0.2;
+
+impl AssumedLoad {
+    /// The masses where they are assumed; none where they are those of the arm.
+    pub fn masses(self) -> Vec<PointMass> {
+        match self {
+            AssumedLoad::Masses => Vec::new(),
+            AssumedLoad::Frame(frame) => vec![PointMass { frame: usize::from(frame), mass_kg: 1.0 }],
+            AssumedLoad::ElbowAndWrist => vec![
+                PointMass { frame: 2, mass_kg: 1.0 - AT_WRIST },
+                PointMass { frame: 4, mass_kg: AT_WRIST },
+            ],
+        }
+    }
 }
 
 /// The pole between flange and target.
@@ -54,15 +79,18 @@ pub enum EmpiricalFault {
     ArmUnsettled,
     /// The sensor has not settled: the reading still has a fraction of the distance from the previous one to go.
     SensorUnsettled,
-    /// A joint (0-based) with a nonlinear spring: square and cube of its torque.
+    /// A joint (0-based) with a nonlinear spring: square and cube of its torque, up to a largest torque. That is part of the fault, not of
+    /// the rows, as are the other torques here: subsets of the rows must see the same regressors.
     NonlinearStiffness {
         /// The joint.
         joint: usize,
         /// Its load.
         load: AssumedLoad,
+        /// That torque (mN m), of that load.
+        largest_mnm: u32,
     },
     /// A joint (0-based) that stiffens under its load: it has yielded by half of its parameter at the torque `bend_mnm`, and by all of it
-    /// at a torque without end. The torque is part of the fault, not of the rows: subsets of the rows must see the same regressors.
+    /// at a torque without end.
     Hardening {
         /// The joint.
         joint: usize,
@@ -77,6 +105,8 @@ pub enum EmpiricalFault {
         joint: usize,
         /// Its load.
         load: AssumedLoad,
+        /// The torque (mN m), of that load, that counts as closing half of it in a program.
+        closed_mnm: u32,
     },
     /// A joint error with harmonics of the sum and the difference of multiples of its angle and of another joint's.
     TwoJointGear {
@@ -215,6 +245,33 @@ impl EmpiricalFault {
         )
     }
 
+    /// The effect that a model file has for it, at size 0; `None` of faults in the measurement, and of those that no file can carry. Play that
+    /// a load closes becomes a spring that stiffens at once: a program needs a slope where the fault has a step.
+    pub fn effect(self) -> Option<Effect> {
+        let newton_metres = |milli: u32| f64::from(milli.max(1)) * 1e-3;
+        let hardening = |joint: usize, load: AssumedLoad, half_mnm: u32| {
+            let half_nm = newton_metres(half_mnm);
+            Effect::JointStiffness(Hardening { joint, mass: load.masses(), half_nm, deflection_rad: 0.0 })
+        };
+        Some(match self {
+            EmpiricalFault::NonlinearStiffness { joint, load, largest_mnm } => {
+                Effect::TorquePowers(TorquePowers {
+                    joint,
+                    mass: load.masses(),
+                    largest_nm: newton_metres(largest_mnm),
+                    square_rad_per_nm2: 0.0,
+                    cube_rad_per_nm3: 0.0,
+                })
+            }
+            EmpiricalFault::Hardening { joint, load, bend_mnm } => hardening(joint, load, bend_mnm),
+            EmpiricalFault::LoadedPlay { joint, load, closed_mnm } => hardening(joint, load, closed_mnm),
+            EmpiricalFault::TwoJointGear { joint, other, orders } => {
+                Effect::GearTwoJoints(TwoJointGear::still(joint, other, orders))
+            }
+            _ => return None,
+        })
+    }
+
     /// Name and unit of each parameter.
     pub fn names(self) -> Vec<(String, &'static str)> {
         let listed = |names: &[&str], unit: &'static str| {
@@ -310,13 +367,11 @@ impl EmpiricalFault {
             // Unsynchronised clocks are tenths of a second apart, and their rates differ by some 100 ppm (0.36 s/h).
             EmpiricalFault::Latency { .. } => 0.3,
             EmpiricalFault::ArmUnsettled | EmpiricalFault::SensorUnsettled => 1e-3,
-            // Relative to a compliance of 1e-5 rad/(N m): the same again at some 30 N m. Of 1 kg in place of some 10: per kg² and kg³.
-            EmpiricalFault::NonlinearStiffness { load: AssumedLoad::Masses, .. } => {
-                [1e-6, 1e-7][parameter.min(1)]
+            EmpiricalFault::NonlinearStiffness { load, .. } => {
+                torque_power_sigma(load == AssumedLoad::Masses, parameter)
             }
-            EmpiricalFault::NonlinearStiffness { .. } => [1e-4, 1e-4][parameter.min(1)],
             EmpiricalFault::Hardening { .. } | EmpiricalFault::LoadedPlay { .. } => 0.2_f64.to_radians(),
-            EmpiricalFault::TwoJointGear { .. } => 3e-4,
+            EmpiricalFault::TwoJointGear { .. } => TWO_JOINT_SIGMA_RAD,
             // The axial run-out of a crossed roller bearing, some 0.02 mm over its diameter of some 150 mm.
             EmpiricalFault::AxisWobble { .. } => {
                 if parameter < 4 {

@@ -406,10 +406,9 @@ fn a_link_that_bends_is_told_from_its_joints() {
     assert!(found.estimated.model.effects.iter().any(|effect| matches!(effect, Effect::LinkBending(_))));
 }
 
-/// Play that gravity closes follows the sign of the torque, not the side of approach. No model file can carry it, so it is told and not
-/// written.
+/// Play that gravity closes follows the sign of the torque, not the side of approach: it is written as a spring that stiffens at once.
 #[test]
-fn play_that_its_load_closes_is_told_and_not_written() {
+fn play_that_its_load_closes_is_told_and_written() {
     let hidden = [Hidden::LoadedPlay { joint: 2, play_rad: 0.0015, closed_nm: 0.05 }];
     let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 81)).dataset);
     let play = found.diagnosis.findings.iter().find(|f| f.effect == "backlash").unwrap();
@@ -417,7 +416,13 @@ fn play_that_its_load_closes_is_told_and_not_written() {
     assert!(play.cause.contains("of backlash that gravity closes"), "{}", play.cause);
     let size = &play.parameters[0];
     assert!((size.value - 0.0015).abs() < 4e-4, "{size:?}");
-    assert!(play.remedy.contains("gear mesh") && play.remedy.contains("leaves it out"), "{}", play.remedy);
+    assert!(play.remedy.contains("gear mesh"), "{}", play.remedy);
+    assert_eq!(play.corrected, Some(true));
+    let flanks = found.estimated.model.effects.iter().find_map(|effect| match effect {
+        Effect::JointStiffness(spring) if spring.joint == 2 => Some(spring.deflection_rad),
+        _ => None,
+    });
+    assert!((flanks.unwrap() - 0.00075).abs() < 2e-4, "{flanks:?}");
     let backlash = |effect: &Effect| matches!(effect, Effect::Backlash(_));
     assert!(!found.estimated.model.effects.iter().any(backlash));
 }
@@ -430,6 +435,10 @@ fn a_spring_that_stiffens_is_no_play() {
     let spring = &identified(&found)[0];
     assert_eq!((spring.effect.as_str(), spring.joints.as_deref()), ("joint-stiffness", Some(&[3][..])));
     assert!(spring.cause.contains("stiffens under its load"), "{}", spring.cause);
+    // It is an effect of the written arm: programs are corrected for it.
+    assert_eq!(spring.corrected, Some(true));
+    let written = &found.estimated.model.effects;
+    assert!(written.iter().any(|effect| matches!(effect, Effect::JointStiffness(_)) && !effect.is_zero()));
 }
 
 /// A joint that lost counts stands off by one angle in all rows before. The written arm is the arm as it is: that of the rows after.
@@ -568,14 +577,13 @@ fn angles_that_are_counted_the_other_way_round_are_no_other_faults() {
     assert!((delay.value.abs() - 0.02).abs() < 4.0 * delay.sigma.unwrap() + 1e-4, "{delay:?}");
 }
 
-/// A joint that stiffens has no place in a model file, and a drooping target moves no program. Where the written arm leaves the second out of
+/// An axis that wobbles has no place in a model file, and a drooping target moves no program. Where the written arm leaves the second out of
 /// its fit, what it lacks of the first is an error of programs all the same.
 #[test]
 fn what_the_written_arm_lacks_of_the_arm_is_in_its_error_beside_a_droop() {
     let mut left_out = 0;
     for seed in [95, 96, 97, 98] {
-        let hidden =
-            [Hidden::LoadedPlay { joint: 1, play_rad: 8e-4, closed_nm: 4.0 }, Hidden::Droop { mm: 0.06 }];
+        let hidden = [Hidden::Wobble { joint: 1, peak_rad: 3e-4 }, Hidden::Droop { mm: 0.06 }];
         let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 240, seed)).dataset);
         left_out += usize::from(
             found
