@@ -39,8 +39,9 @@ struct Template {
     output: PathBuf,
 }
 
+/// What a sensor measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Reads {
+pub(super) enum Reads {
     /// Length of a draw-wire cable.
     Cable,
     /// Position of a reflector or marker. `tracker` and `camera` mean the same.
@@ -50,6 +51,16 @@ enum Reads {
     Pose,
 }
 
+impl From<Reads> for Sensor {
+    fn from(reads: Reads) -> Self {
+        match reads {
+            Reads::Cable => Sensor::Cable,
+            Reads::Position => Sensor::Position,
+            Reads::Pose => Sensor::Pose,
+        }
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let What::Template(template) = &arguments.what;
     empty_table(template)
@@ -57,12 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
 
 fn empty_table(arguments: &Template) -> anyhow::Result<ExitStatus> {
     let robot = inputs::robot(arguments.links.of(&arguments.robot))?;
-    let sensor = match arguments.sensor {
-        Reads::Cable => Sensor::Cable,
-        Reads::Position => Sensor::Position,
-        Reads::Pose => Sensor::Pose,
-    };
-    let columns = template::columns(sensor);
+    let columns = template::columns(arguments.sensor.into());
     let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
     let mut batch = Batch::default();
     let form = names.join(",") + "\n";

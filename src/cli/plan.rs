@@ -22,23 +22,12 @@ use super::computation::{Common, on_threads};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs::{self, UrdfLinks};
+use super::measurement::Reads;
 use super::output_extension;
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::stated_frames::{StatedFrameArguments, numbers};
 use super::terminal::print_message;
-
-/// Sensor type.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum SensorArgument {
-    /// Draw-wire encoder: length.
-    Cable,
-    /// Tracker with a reflector, or a camera: position. `tracker` and `camera` mean the same.
-    #[value(alias = "tracker", alias = "camera")]
-    Position,
-    /// Tracker with a 6D target: pose.
-    Pose,
-}
 
 /// Design criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -60,7 +49,7 @@ pub(super) struct Arguments {
     links: UrdfLinks,
     /// Sensor that will measure.
     #[arg(long, value_enum)]
-    sensor: SensorArgument,
+    sensor: Reads,
     /// Number of different poses; repeats are added to these. Default: 60; for an unexplained error ten, each read three times from one side
     /// and once from the other if a joint scatters, or ten visits of one pose if it follows time.
     #[arg(long)]
@@ -154,11 +143,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let robot = inputs::robot(arguments.links.of(&arguments.robot))?;
     Batch::check(&inputs_of, &targets)?;
     arguments.output.as_deref().map_or(Ok(()), output_extension::refuse_nc)?;
-    let sensor = match arguments.sensor {
-        SensorArgument::Cable => Sensor::Cable,
-        SensorArgument::Position => Sensor::Position,
-        SensorArgument::Pose => Sensor::Pose,
-    };
+    let sensor = Sensor::from(arguments.sensor);
     let frames = arguments.stated.planned(sensor)?;
     let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
     let options =

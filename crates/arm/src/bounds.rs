@@ -3,6 +3,7 @@
 //! The bounds are wide; they exclude NaN and infinity, units mistaken by a thousand, and a singular joint map. All code after
 //! loading relies on them.
 
+use std::fmt;
 use std::ops::RangeInclusive;
 
 use nalgebra::Matrix6;
@@ -56,11 +57,11 @@ impl Bound {
     ///
     /// # Errors
     /// [`InvalidValue`].
-    pub fn check(&self, key: impl FnOnce() -> String, value: f64) -> Result<(), InvalidValue> {
+    pub fn check(&self, key: impl fmt::Display, value: f64) -> Result<(), InvalidValue> {
         if self.contains(value) {
             return Ok(());
         }
-        Err(InvalidValue { key: key(), found: display_number(value), expected: self.expected })
+        Err(InvalidValue { key: key.to_string(), found: display_number(value), expected: self.expected })
     }
 
     /// Refuses the first of several numbers under one key that is outside the range.
@@ -69,10 +70,10 @@ impl Bound {
     /// [`InvalidValue`].
     pub fn check_all<'v>(
         &self,
-        key: &str,
+        key: impl fmt::Display,
         values: impl IntoIterator<Item = &'v f64>,
     ) -> Result<(), InvalidValue> {
-        values.into_iter().try_for_each(|value| self.check(|| key.to_owned(), *value))
+        values.into_iter().try_for_each(|value| self.check(&key, *value))
     }
 }
 
@@ -153,10 +154,10 @@ pub(crate) fn link(
 ) -> Result<(), InvalidValue> {
     let key = |name: &str| format!("link {} {name}", index + 1);
     for (name, value) in [("a_mm", a), ("d_mm", d)] {
-        LENGTH_MM.check(|| key(name), value)?;
+        LENGTH_MM.check(key(name), value)?;
     }
     for (name, value) in [("alpha_deg", alpha), ("theta_deg", theta), ("beta_deg", beta)] {
-        TWIST_DEG.check(|| key(name), value)?;
+        TWIST_DEG.check(key(name), value)?;
     }
     Ok(())
 }
@@ -167,8 +168,8 @@ pub(crate) fn link(
 /// [`InvalidValue`].
 pub fn bodies(bodies: &[Body]) -> Result<(), InvalidValue> {
     for (i, body) in bodies.iter().enumerate() {
-        MASS_KG.check(|| format!("body {} mass_kg", i + 1), body.mass_kg)?;
-        LENGTH_MM.check_all(&format!("body {} centre_mm", i + 1), &body.centre_mm)?;
+        MASS_KG.check(format_args!("body {} mass_kg", i + 1), body.mass_kg)?;
+        LENGTH_MM.check_all(format_args!("body {} centre_mm", i + 1), &body.centre_mm)?;
     }
     Ok(())
 }

@@ -122,7 +122,19 @@ impl Effect {
 
     /// The joint (0-based) that the effect acts on; `None` where it acts on the links or on several joints.
     pub fn joint(&self) -> Option<usize> {
-        each!(self, e => e.joint())
+        match self {
+            Effect::JointCompliance(e) => Some(e.joint),
+            Effect::LumpedCompliance(e) => Some(e.joint),
+            Effect::GearEccentricity(e) | Effect::GearTransmission(e) => Some(e.joint),
+            Effect::GearMap(e) => Some(e.joint),
+            Effect::GearRatio(e) => Some(e.joint),
+            Effect::JointStiffness(e) => Some(e.joint),
+            Effect::TorquePowers(e) => Some(e.joint),
+            Effect::GearTwoJoints(e) => Some(e.joint),
+            Effect::JointCoupling(e) => Some(e.joint),
+            Effect::Backlash(e) => Some(e.joint),
+            Effect::LinkBending(_) | Effect::ThermalDrift(_) | Effect::SmoothCorrection(_) => None,
+        }
     }
 
     /// Parameters with their present values.

@@ -98,7 +98,7 @@ impl SumLimit {
     pub(crate) fn check(&self, key: &str) -> Result<(), InvalidValue> {
         let [min, max] = [self.min_rad, self.max_rad].map(f64::to_degrees);
         let range = format!("{key} min_deg and max_deg");
-        COUPLING.check_all(&format!("{key} of"), &self.factors)?;
+        COUPLING.check_all(format_args!("{key} of"), &self.factors)?;
         JOINT_DEG.check_all(&range, &[min, max])?;
         if min >= max {
             return Err(InvalidValue::new(range, format!("{min} and {max}"), "min below max"));

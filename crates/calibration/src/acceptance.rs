@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Model;
-use truegrind_math::statistics::ErrorSummary;
+use truegrind_math::statistics::{ErrorSummary, extent};
 use truegrind_math::work::report_step;
 
 use self::orientation::Orientation;
@@ -100,8 +100,7 @@ impl Coverage {
     fn of(dataset: &Dataset, estimated: &Estimated) -> Option<Self> {
         let range = |joint: usize| {
             let angles = dataset.rows.iter().map(|row| row.joints[joint].to_degrees());
-            let (low, high) =
-                angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)));
+            let [low, high] = extent(angles);
             let region = &estimated.region;
             let fitted_deg = region.max_deg[joint] - region.min_deg[joint];
             Self { joint, tested_deg: high - low, fitted_deg }

@@ -65,6 +65,19 @@ impl ErrorSummary {
     }
 }
 
+/// The smallest and the largest of some values, NaN left out; +∞ and −∞ without any.
+///
+/// ```
+/// use truegrind_math::statistics::extent;
+///
+/// assert_eq!(extent([3.0, f64::NAN, -1.0]), [-1.0, 3.0]);
+/// assert_eq!(extent([]), [f64::INFINITY, f64::NEG_INFINITY]);
+/// ```
+pub fn extent(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    values.into_iter().fold(none, |[low, high], value| [low.min(value), high.max(value)])
+}
+
 /// The largest of some values; 0 without any, NaN if one of them is NaN: an unknown error is not 0.
 pub fn largest(sizes: impl IntoIterator<Item = f64>) -> f64 {
     sizes.into_iter().fold(0.0, |most: f64, size| if size.is_nan() || size > most { size } else { most })

@@ -10,7 +10,7 @@ use self::verdict::key_figures;
 use super::deviation::{Risk, sections, status_cell, status_word};
 use super::document::{Block, Document};
 use super::placement;
-use super::table::{Cell, Column, Table};
+use super::table::Table;
 use truegrind_compensation::deviation::{MotionStatus, PathReport};
 use truegrind_compensation::plan::reason::{Figure, OutcomeReason};
 use truegrind_compensation::plan::{MotionOutcome, Plan};
@@ -40,49 +40,30 @@ const MAX_LISTED: usize = 8;
 
 /// One row per motion; `files` in the order of the listing.
 pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
-    let several = files.len() > 1;
-    let mut columns = vec![
-        Column::count("line", "Line"),
-        Column::text("instruction", "Instruction"),
-        Column::text("status", "Status"),
-        Column::number("before_mm", "before", "mm", 3),
-        Column::number("after_mm", "remainder", "mm", 4),
-        Column::number("shape_sigma_mm", "1σ shape", "mm", 3),
-        Column::number("sigma_mm", "1σ placement", "mm", 3),
-        Column::number("bend_mm", "between", "mm", 3),
-        Column::count("inserted", "Inserted"),
-        Column::text("reason", "Reason"),
-    ];
-    if several {
-        columns.insert(0, Column::text("file", "File"));
+    let motions = plan.outcomes.iter().map(|outcome| (outcome, motion(outcome, listing)));
+    let mut rows = Table::of("Motions", motions);
+    if files.len() > 1 {
+        rows = rows.text("file", "File", |(_, (place, _))| file_name(files, *place));
     }
-    let mut table = Table::new("Motions", columns);
-    for outcome in &plan.outcomes {
-        let (place, instruction) = motion(outcome, listing);
-        let mut row = vec![
-            Cell::Count(u64::from(place.line)),
-            instruction.into(),
-            status_cell(outcome.status),
-            outcome.before_mm.get().into(),
-            outcome.after_mm.get().into(),
-            outcome.shape_sigma_mm.get().into(),
-            outcome.sigma_mm.get().into(),
-            outcome.path_deviation_mm.get().into(),
-            if outcome.inserted > 0 { Cell::Count(u64::from(outcome.inserted)) } else { Cell::Missing },
-            outcome.reason().map(|reason| reason.to_string()).into(),
-        ];
-        if several {
-            row.insert(0, file_name(files, place).into());
-        }
-        table.push(row);
-    }
-    table.notes.push(
-        "before: deviation of the tool at the end of the uncorrected motion. remainder: what the model predicts is left after rounding and inverse kinematics; uncorrected motions keep their deviation. 1σ: predicted from \
-         the covariance of the model, for the shape of the cut (after the best rigid registration of all cuts on the part) and for its placement. between: \
-         deviation from the intended path between the targets. Inserted: number of targets inserted before the end of the motion."
-            .to_owned(),
-    );
-    table
+    rows.count("line", "Line", |(_, (place, _))| place.line as usize)
+        .text("instruction", "Instruction", |(_, (_, instruction))| *instruction)
+        .text("status", "Status", |(outcome, _)| status_cell(outcome.status))
+        .number("before_mm", "before", "mm", 3, |(outcome, _)| outcome.before_mm.get())
+        .number("after_mm", "remainder", "mm", 4, |(outcome, _)| outcome.after_mm.get())
+        .number("shape_sigma_mm", "1σ shape", "mm", 3, |(outcome, _)| outcome.shape_sigma_mm.get())
+        .number("sigma_mm", "1σ placement", "mm", 3, |(outcome, _)| outcome.sigma_mm.get())
+        .number("bend_mm", "between", "mm", 3, |(outcome, _)| outcome.path_deviation_mm.get())
+        .count("inserted", "Inserted", |(outcome, _)| {
+            (outcome.inserted > 0).then_some(outcome.inserted as usize)
+        })
+        .text("reason", "Reason", |(outcome, _)| outcome.reason().map(|reason| reason.to_string()))
+        .note(
+            "before: deviation of the tool at the end of the uncorrected motion. remainder: what the model predicts is left after rounding and \
+             inverse kinematics; uncorrected motions keep their deviation. 1σ: predicted from the covariance of the model, for the shape of the \
+             cut (after the best rigid registration of all cuts on the part) and for its placement. between: deviation from the intended path \
+             between the targets. Inserted: number of targets inserted before the end of the motion.",
+        )
+        .table()
 }
 
 /// [`table`] for a page: shortened and without empty columns.

@@ -229,36 +229,22 @@ pub fn short_table(report: &PathReport) -> Table {
 
 /// Points that were refused, flagged or left, in path order. Neighbours with the same status and kind of reason share a row.
 pub fn flag_table(report: &PathReport) -> Table {
-    let mut table = Table::new(
-        "Points to check",
-        vec![
-            Column::text("lines", "Lines"),
-            Column::text("points", "Points"),
-            Column::count("count", "Count"),
-            Column::text("status", "Status"),
-            Column::text("reason", "Reason"),
-        ],
-    );
     let kind = |point: &PathPoint| (point.status, point.kind_of_reason());
-    for run in report.points.chunk_by(|a, b| kind(a) == kind(b)) {
-        let [first, ..] = run else { continue };
-        if first.status == MotionStatus::Changed {
-            continue;
-        }
-        let reason = first.reason.as_ref().map(|reason| {
-            let same = run.iter().all(|point| point.reason.as_ref() == Some(reason));
-            if same { reason.clone() } else { format!("{reason} (the first)") }
-        });
-        let lines = run.iter().map(|point| point.line as usize).filter(|line| *line > 0);
-        table.push([
-            range(lines).into(),
-            range(run.iter().map(|point| point.index)).into(),
-            run.len().into(),
-            status_cell(first.status),
-            reason.into(),
-        ]);
-    }
-    table
+    let runs = report.points.chunk_by(|a, b| kind(a) == kind(b));
+    let reason = |run: &[PathPoint]| {
+        let reason = run[0].reason.as_ref()?;
+        let same = run.iter().all(|point| point.reason.as_ref() == Some(reason));
+        Some(if same { reason.clone() } else { format!("{reason} (the first)") })
+    };
+    Table::of("Points to check", runs.filter(|run| run[0].status != MotionStatus::Changed))
+        .text("lines", "Lines", |run| {
+            range(run.iter().map(|point| point.line as usize).filter(|line| *line > 0))
+        })
+        .text("points", "Points", |run| range(run.iter().map(|point| point.index)))
+        .count("count", "Count", |run| run.len())
+        .text("status", "Status", |run| status_cell(run[0].status))
+        .text("reason", "Reason", |run| reason(run))
+        .table()
 }
 
 /// Smallest and largest number; `None` without numbers.

@@ -35,7 +35,7 @@ pub struct Cause {
 }
 
 /// One arm. Serialised as its bit-exact record.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 pub struct Row {
     /// Measurement file.
     pub file: String,
@@ -101,20 +101,7 @@ impl Row {
 
     /// The row of an arm that could not be diagnosed.
     pub fn failed(file: String, reason: String) -> Row {
-        Row {
-            file,
-            robot: None,
-            rows: 0,
-            nominal_mm: None,
-            geometric_mm: None,
-            extended_mm: None,
-            written_mm: None,
-            noise_floor_mm: None,
-            causes: Vec::new(),
-            output: None,
-            note: Some(reason),
-            failed: true,
-        }
+        Row { file, note: Some(reason), failed: true, ..Row::default() }
     }
 
     /// Possible gain: held-out error of the nominal links minus that of the written arm (mm).

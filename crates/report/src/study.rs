@@ -238,7 +238,7 @@ fn by_split(rows: &[MethodRow]) -> String {
     Graph {
         title: "Held-out RMSE of each split".to_owned(),
         x: Axis::new("seed of the split", ""),
-        y: Axis { range: None, ..Axis::new("RMSE", "mm") },
+        y: Axis::new("RMSE", "mm"),
         series: series.collect(),
         ..Graph::default()
     }

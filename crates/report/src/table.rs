@@ -100,30 +100,32 @@ pub enum Cell {
     Missing,
 }
 
-/// A table that gets its columns one by one, each with the function that makes its cells from the items.
-#[derive(Debug)]
-pub struct Rows<T> {
-    items: Vec<T>,
+/// A table with one row per item, whose columns come one by one, each with the function that makes its cells.
+pub struct Rows<'c, I: IntoIterator> {
+    items: I,
+    cells: Vec<CellOf<'c, I::Item>>,
+    /// Still without rows.
     table: Table,
 }
 
-impl<T> Rows<T> {
+/// Makes the cell of an item in one column.
+type CellOf<'c, T> = Box<dyn Fn(&T) -> Cell + 'c>;
+
+impl<'c, I: IntoIterator> Rows<'c, I> {
     /// Adds a column.
-    pub fn column<C: Into<Cell>>(mut self, column: Column, cell: impl Fn(&T) -> C) -> Self {
+    pub fn column<C: Into<Cell>>(mut self, column: Column, cell: impl Fn(&I::Item) -> C + 'c) -> Self {
         self.table.columns.push(column);
-        for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
-            row.push(cell(item).into());
-        }
+        self.cells.push(Box::new(move |item| cell(item).into()));
         self
     }
 
     /// Adds a column of texts.
-    pub fn text<C: Into<Cell>>(self, key: &str, heading: &str, cell: impl Fn(&T) -> C) -> Self {
+    pub fn text<C: Into<Cell>>(self, key: &str, heading: &str, cell: impl Fn(&I::Item) -> C + 'c) -> Self {
         self.column(Column::text(key, heading), cell)
     }
 
     /// Adds a column of integers.
-    pub fn count<C: Into<Cell>>(self, key: &str, heading: &str, cell: impl Fn(&T) -> C) -> Self {
+    pub fn count<C: Into<Cell>>(self, key: &str, heading: &str, cell: impl Fn(&I::Item) -> C + 'c) -> Self {
         self.column(Column::count(key, heading), cell)
     }
 
@@ -134,7 +136,7 @@ impl<T> Rows<T> {
         heading: &str,
         unit: &str,
         decimals: usize,
-        cell: impl Fn(&T) -> C,
+        cell: impl Fn(&I::Item) -> C + 'c,
     ) -> Self {
         self.column(Column::number(key, heading, unit, decimals), cell)
     }
@@ -146,7 +148,7 @@ impl<T> Rows<T> {
         heading: &str,
         unit: &str,
         digits: usize,
-        cell: impl Fn(&T) -> C,
+        cell: impl Fn(&I::Item) -> C + 'c,
     ) -> Self {
         self.column(Column::significant(key, heading, unit, digits), cell)
     }
@@ -158,7 +160,9 @@ impl<T> Rows<T> {
     }
 
     /// The table.
-    pub fn table(self) -> Table {
+    pub fn table(mut self) -> Table {
+        let row = |item| self.cells.iter().map(|cell| cell(&item)).collect();
+        self.table.rows = self.items.into_iter().map(row).collect();
         self.table
     }
 }
@@ -170,10 +174,8 @@ impl Table {
     }
 
     /// A table with one row per item, still without columns.
-    pub fn of<T>(title: impl Into<String>, items: impl IntoIterator<Item = T>) -> Rows<T> {
-        let items: Vec<T> = items.into_iter().collect();
-        let rows = vec![Vec::new(); items.len()];
-        Rows { items, table: Self { rows, ..Self::new(title, Vec::new()) } }
+    pub fn of<'c, I: IntoIterator>(title: impl Into<String>, items: I) -> Rows<'c, I> {
+        Rows { items, cells: Vec::new(), table: Self::new(title, Vec::new()) }
     }
 
     /// Adds a row.

@@ -27,6 +27,7 @@ use crate::contact::{Contact, Foot};
 use crate::domain::Domain;
 use crate::error::SurfaceError;
 use crate::tessellation::Tessellation;
+use truegrind_math::statistics;
 
 /// Triangles that meet at a smaller angle than this share a smooth normal.
 const CREASE_RAD: f64 = std::f64::consts::FRAC_PI_6;
@@ -419,9 +420,7 @@ fn stacked(vertices: &[Point3<f64>], facets: &[[u32; 3]], whole: &Domain) -> f64
     let boxes = facets.iter().map(|facet| {
         let corners = facet.map(|i| vertices[i as usize]);
         let extent = |k: usize| {
-            let (low, high) = corners
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| (low.min(c[k]), high.max(c[k])));
+            let [low, high] = statistics::extent(corners.iter().map(|corner| corner[k]));
             high - low
         };
         (extent(0) / side(whole.first)).min(1.0) * (extent(1) / side(whole.second)).min(1.0)

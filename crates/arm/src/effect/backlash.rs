@@ -36,10 +36,6 @@ pub struct Backlash {
 }
 
 impl Backlash {
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         vec![EffectParameter { name: "play", unit: "rad", value: self.play_rad }]
     }

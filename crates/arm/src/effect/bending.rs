@@ -64,10 +64,6 @@ struct Load<R> {
 }
 
 impl Bending {
-    pub(super) fn joint(&self) -> Option<usize> {
-        None
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         let (name, unit) = match self.frame {
             None => ("compliance of the link", "rad/(N m)"),

@@ -36,28 +36,26 @@ impl Effect {
     pub fn check(&self) -> Result<(), InvalidValue> {
         joint("joint", self.joint().unwrap_or(0))?;
         match self {
-            Effect::JointCompliance(e) => {
-                COMPLIANCE.check(|| "compliance_rad_per_nm".to_owned(), e.compliance_rad_per_nm)
-            }
+            Effect::JointCompliance(e) => COMPLIANCE.check("compliance_rad_per_nm", e.compliance_rad_per_nm),
             Effect::LumpedCompliance(e) => lumps(e),
             Effect::LinkBending(e) => bending(e),
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => {
-                ORDER.check(|| "order".to_owned(), e.order)?;
-                OFFSET_RAD.check(|| "sine_rad".to_owned(), e.sine_rad)?;
-                OFFSET_RAD.check(|| "cosine_rad".to_owned(), e.cosine_rad)
+                ORDER.check("order", e.order)?;
+                OFFSET_RAD.check("sine_rad", e.sine_rad)?;
+                OFFSET_RAD.check("cosine_rad", e.cosine_rad)
             }
             Effect::GearMap(e) => knots(e),
-            Effect::GearRatio(e) => SHARE.check(|| "error".to_owned(), e.error),
+            Effect::GearRatio(e) => SHARE.check("error", e.error),
             Effect::JointStiffness(e) => {
                 masses(e.joint, &e.mass)?;
-                TORQUE_NM.check(|| "half_nm".to_owned(), e.half_nm)?;
-                OFFSET_RAD.check(|| "deflection_rad".to_owned(), e.deflection_rad)
+                TORQUE_NM.check("half_nm", e.half_nm)?;
+                OFFSET_RAD.check("deflection_rad", e.deflection_rad)
             }
             Effect::TorquePowers(e) => {
                 masses(e.joint, &e.mass)?;
-                TORQUE_NM.check(|| "largest_nm".to_owned(), e.largest_nm)?;
-                COMPLIANCE.check(|| "square_rad_per_nm2".to_owned(), e.square_rad_per_nm2)?;
-                COMPLIANCE.check(|| "cube_rad_per_nm3".to_owned(), e.cube_rad_per_nm3)
+                TORQUE_NM.check("largest_nm", e.largest_nm)?;
+                COMPLIANCE.check("square_rad_per_nm2", e.square_rad_per_nm2)?;
+                COMPLIANCE.check("cube_rad_per_nm3", e.cube_rad_per_nm3)
             }
             Effect::GearTwoJoints(e) => {
                 joint("other", e.other)?;
@@ -66,9 +64,9 @@ impl Effect {
             }
             Effect::JointCoupling(e) => {
                 joint("driver", e.driver)?;
-                SHARE.check(|| "factor".to_owned(), e.factor)
+                SHARE.check("factor", e.factor)
             }
-            Effect::Backlash(e) => OFFSET_RAD.check(|| "play_rad".to_owned(), e.play_rad),
+            Effect::Backlash(e) => OFFSET_RAD.check("play_rad", e.play_rad),
             Effect::ThermalDrift(e) => thermal(e),
             Effect::SmoothCorrection(e) => smooth(e),
         }
@@ -111,7 +109,7 @@ fn lumps(load: &LumpedCompliance) -> Result<(), InvalidValue> {
                 return Err(InvalidValue::new(key, axis.to_string(), "an axis from 0 to 2"));
             }
         }
-        COMPLIANCE.check(|| "lump.factor".to_owned(), lump.factor)?;
+        COMPLIANCE.check("lump.factor", lump.factor)?;
     }
     Ok(())
 }
@@ -123,7 +121,7 @@ fn masses(joint: usize, masses: &[PointMass]) -> Result<(), InvalidValue> {
             let expected = "a frame beyond the joint, to 6";
             return Err(InvalidValue::new("mass.frame", mass.frame.to_string(), expected));
         }
-        MASS_KG.check(|| "mass.mass_kg".to_owned(), mass.mass_kg)?;
+        MASS_KG.check("mass.mass_kg", mass.mass_kg)?;
     }
     Ok(())
 }
@@ -139,7 +137,7 @@ fn bending(bending: &Bending) -> Result<(), InvalidValue> {
     if let Some(frame) = bending.frame.filter(|frame| !(bending.joint + 1..=6).contains(frame)) {
         return Err(InvalidValue::new("frame", frame.to_string(), "a frame from the end of the link to 6"));
     }
-    COMPLIANCE.check(|| "compliance_rad_per_nm".to_owned(), bending.compliance_rad_per_nm)
+    COMPLIANCE.check("compliance_rad_per_nm", bending.compliance_rad_per_nm)
 }
 
 fn knots(map: &ErrorMap) -> Result<(), InvalidValue> {
@@ -148,10 +146,10 @@ fn knots(map: &ErrorMap) -> Result<(), InvalidValue> {
 }
 
 fn thermal(thermal: &Thermal) -> Result<(), InvalidValue> {
-    GROWTH.check(|| "growth".to_owned(), thermal.growth)?;
-    GROWTH.check(|| "growth_per_k".to_owned(), thermal.growth_per_k)?;
-    TIME_H.check(|| "time_constant_h".to_owned(), thermal.time_constant_h)?;
-    TEMPERATURE_C.check(|| "reference_c".to_owned(), thermal.reference_c)
+    GROWTH.check("growth", thermal.growth)?;
+    GROWTH.check("growth_per_k", thermal.growth_per_k)?;
+    TIME_H.check("time_constant_h", thermal.time_constant_h)?;
+    TEMPERATURE_C.check("reference_c", thermal.reference_c)
 }
 
 fn smooth(smooth: &SmoothCorrection) -> Result<(), InvalidValue> {
@@ -161,6 +159,6 @@ fn smooth(smooth: &SmoothCorrection) -> Result<(), InvalidValue> {
         return Err(InvalidValue::new("weights_rad", found, "one for each centre"));
     }
     ANGLE_RAD.check_all("centres_rad", smooth.centres_rad.as_flattened())?;
-    REACH_RAD.check(|| "reach_rad".to_owned(), smooth.reach_rad)?;
+    REACH_RAD.check("reach_rad", smooth.reach_rad)?;
     OFFSET_RAD.check_all("weights_rad", smooth.weights_rad.as_flattened())
 }

@@ -39,10 +39,6 @@ pub struct Compliance {
 }
 
 impl Compliance {
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         vec![EffectParameter { name: "compliance", unit: "rad/(N m)", value: self.compliance_rad_per_nm }]
     }

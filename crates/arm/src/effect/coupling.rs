@@ -22,10 +22,6 @@ pub struct Coupling {
 }
 
 impl Coupling {
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         vec![EffectParameter { name: "factor", unit: "1", value: self.factor }]
     }

@@ -50,10 +50,6 @@ pub struct ErrorMap {
 }
 
 impl ErrorMap {
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         self.knots_rad.iter().map(|&value| EffectParameter { name: "knot", unit: "rad", value }).collect()
     }

@@ -34,10 +34,6 @@ pub struct GearRatio {
 }
 
 impl GearRatio {
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         vec![EffectParameter { name: "ratio error", unit: "1", value: self.error }]
     }

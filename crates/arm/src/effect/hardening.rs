@@ -51,10 +51,6 @@ pub struct Hardening {
 }
 
 impl Hardening {
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         vec![EffectParameter { name: "deflection", unit: "rad", value: self.deflection_rad }]
     }

@@ -52,10 +52,6 @@ impl Harmonic {
         self.sine_rad.hypot(self.cosine_rad)
     }
 
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         vec![
             EffectParameter { name: "sine", unit: "rad", value: self.sine_rad },

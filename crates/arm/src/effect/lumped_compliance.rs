@@ -77,10 +77,6 @@ const FIRST_MOMENTS: [[&str; 3]; 7] = [
 ];
 
 impl LumpedCompliance {
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         self.lump
             .iter()

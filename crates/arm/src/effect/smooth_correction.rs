@@ -66,10 +66,6 @@ impl SmoothCorrection {
         self.centres_rad.iter().any(|c| radial::distance(&v, c) < self.reach_rad)
     }
 
-    pub(super) fn joint(&self) -> Option<usize> {
-        None
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         let values = self.weights_rad.iter().flatten();
         values.map(|value| EffectParameter { name: "weight", unit: "rad", value: *value }).collect()

@@ -36,10 +36,6 @@ fn is_zero(hours: &f64) -> bool {
 }
 
 impl Thermal {
-    pub(super) fn joint(&self) -> Option<usize> {
-        None
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         vec![
             EffectParameter { name: "growth", unit: "1", value: self.growth },

@@ -52,10 +52,6 @@ pub struct TorquePowers {
 }
 
 impl TorquePowers {
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         vec![
             EffectParameter {

@@ -51,10 +51,6 @@ impl TwoJointGear {
         Self { joint, other, orders, sum_rad: [0.0; 2], difference_rad: [0.0; 2] }
     }
 
-    pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {
         let ([a, b], [c, d]) = (self.sum_rad, self.difference_rad);
         [

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use nalgebra::{DMatrix, Matrix3};
 
-use super::{Estimated, EstimatedParameter, Provenance, StageErrors, WidthUncertainty};
+use super::{Estimated, EstimatedParameter, StageErrors, WidthUncertainty};
 use crate::bounds::{self, Bound, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG};
 use crate::condition::Condition;
 use crate::model::Model;
@@ -42,16 +42,10 @@ pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
     for (key, errors) in [("registered", &model.registered), ("geometry", &model.calibrated)] {
         stage(errors).map_err(|invalid| invalid.within(key))?;
     }
-    if let Some(beyond) = model.beyond_noise_mm {
-        ERROR_MM.check(|| "beyond_noise_mm".to_owned(), beyond)?;
-    }
-    for beyond in model.beyond_noise_rad.iter().flatten() {
-        ERROR_RAD.check(|| "beyond_noise_rad".to_owned(), *beyond)?;
-    }
-    if let Some(floor) = model.noise_floor_mm {
-        ERROR_MM.check(|| "noise_floor_mm".to_owned(), floor)?;
-    }
-    provenance(&model.provenance).map_err(|invalid| invalid.within("provenance"))?;
+    ERROR_MM.check_all("beyond_noise_mm", &model.beyond_noise_mm)?;
+    ERROR_RAD.check_all("beyond_noise_rad", model.beyond_noise_rad.iter().flatten())?;
+    ERROR_MM.check_all("noise_floor_mm", &model.noise_floor_mm)?;
+    SHARE.check("provenance.held_out", model.provenance.held_out)?;
     region(&model.region).map_err(|invalid| invalid.within("region"))?;
     condition(&model.condition).map_err(|invalid| invalid.within("condition"))?;
     order(model)?;
@@ -93,14 +87,14 @@ fn arms(nominal: &Model, estimated: &Model) -> Result<(), InvalidValue> {
     }
     for (i, (from, to)) in nominal.links.iter().zip(&estimated.links).enumerate() {
         let key = |name: &str| format!("estimated.link {} {name}", i + 1);
-        MAX_LINK_CHANGE_MM.check(|| key("a_mm less nominal"), to.a_mm - from.a_mm)?;
-        MAX_LINK_CHANGE_MM.check(|| key("d_mm less nominal"), to.d_mm - from.d_mm)?;
+        MAX_LINK_CHANGE_MM.check(key("a_mm less nominal"), to.a_mm - from.a_mm)?;
+        MAX_LINK_CHANGE_MM.check(key("d_mm less nominal"), to.d_mm - from.d_mm)?;
         for (name, turn) in [
             ("alpha_deg less nominal", to.alpha_rad - from.alpha_rad),
             ("theta_deg less nominal", to.theta_rad - from.theta_rad),
             ("beta_deg less nominal", to.beta_rad - from.beta_rad),
         ] {
-            MAX_LINK_CHANGE_DEG.check(|| key(name), turn.to_degrees())?;
+            MAX_LINK_CHANGE_DEG.check(key(name), turn.to_degrees())?;
         }
     }
     Ok(())
@@ -160,16 +154,12 @@ fn stage(errors: &StageErrors) -> Result<(), InvalidValue> {
             ("standard_deviation", errors.standard_deviation),
             ("max", errors.max),
         ] {
-            ERROR_MM.check(|| key.to_owned(), value)?;
+            ERROR_MM.check(key, value)?;
         }
-        SIGNED_MM.check(|| "mean".to_owned(), errors.mean)
+        SIGNED_MM.check("mean", errors.mean)
     };
     summary(&errors.fitted).map_err(|invalid| invalid.within("fitted"))?;
     summary(&errors.held_out).map_err(|invalid| invalid.within("held_out"))
-}
-
-fn provenance(provenance: &Provenance) -> Result<(), InvalidValue> {
-    SHARE.check(|| "held_out".to_owned(), provenance.held_out)
 }
 
 pub(super) fn region(region: &Region) -> Result<(), InvalidValue> {
@@ -190,8 +180,8 @@ pub(super) fn region(region: &Region) -> Result<(), InvalidValue> {
         ));
     }
     JOINT_DEG.check_all("samples_deg", region.samples_deg.as_flattened())?;
-    SPACING_DEG.check(|| "spacing_deg".to_owned(), region.spacing_deg)?;
-    SIGMA_MM.check(|| "sigma_mm".to_owned(), region.sigma_mm)
+    SPACING_DEG.check("spacing_deg", region.spacing_deg)?;
+    SIGMA_MM.check("sigma_mm", region.sigma_mm)
 }
 
 pub(super) fn condition(condition: &Condition) -> Result<(), InvalidValue> {
@@ -200,9 +190,7 @@ pub(super) fn condition(condition: &Condition) -> Result<(), InvalidValue> {
         ("temperature_c", TEMPERATURE_C, condition.temperature_c),
         ("payload_kg", MASS_KG, condition.payload_kg),
     ] {
-        if let Some(value) = value {
-            bound.check(|| key.to_owned(), value)?;
-        }
+        bound.check_all(key, &value)?;
     }
     LENGTH_MM.check_all("payload_centre_mm", &condition.payload_centre_mm)?;
     match condition.approach.iter().find(|side| !(-1..=1).contains(*side)) {
@@ -212,13 +200,11 @@ pub(super) fn condition(condition: &Condition) -> Result<(), InvalidValue> {
 }
 
 fn number(parameter: &EstimatedParameter) -> Result<(), InvalidValue> {
-    VALUE.check(|| "nominal".to_owned(), parameter.nominal)?;
-    VALUE.check(|| "value".to_owned(), parameter.value)?;
-    SIGMA.check(|| "sigma".to_owned(), parameter.sigma)?;
-    if let Some(prior) = parameter.prior_sigma {
-        PRIOR.check(|| "prior_sigma".to_owned(), prior)?;
-    }
-    SHARE.check(|| "determined".to_owned(), parameter.determined)
+    VALUE.check("nominal", parameter.nominal)?;
+    VALUE.check("value", parameter.value)?;
+    SIGMA.check("sigma", parameter.sigma)?;
+    PRIOR.check_all("prior_sigma", &parameter.prior_sigma)?;
+    SHARE.check("determined", parameter.determined)
 }
 
 /// Every parameter of the covariance must belong to the arm, and the list of parameters must have the same order.

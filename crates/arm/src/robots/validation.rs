@@ -102,7 +102,7 @@ fn bounded(sheet: &DataSheet) -> Result<(), InvalidValue> {
         POSITION_MM.check_all("published.position_mm", pose.position_mm.iter().flatten())?;
         POSITION_MM.check_all("published.radius_mm", &pose.radius_mm)?;
         DIRECTION.check_all("published.quaternion_wxyz", pose.quaternion_wxyz.iter().flatten())?;
-        POSE_TOLERANCE_MM.check(|| "published.tolerance_mm".to_owned(), pose.tolerance_mm)?;
+        POSE_TOLERANCE_MM.check("published.tolerance_mm", pose.tolerance_mm)?;
     }
     Ok(())
 }

@@ -14,6 +14,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{Parameter, arm_parameters};
+use truegrind_math::statistics::extent;
 
 /// Smallest share of the displacements over the region of the fit with which a test accepts an arm. A box of 300 mm with one orientation
 /// shows 5 % of an arm of 1.3 m and 15 % of one of 0.6 m; a box of 60 mm at most 2 %, one pose none.
@@ -48,9 +49,7 @@ impl Tested {
             .collect();
         let places = placed(&estimated.model, &every(&own, own.len()), target);
         let volume_mm = std::array::from_fn(|axis| {
-            let along = places.iter().map(|(at, _)| at[axis]);
-            let (low, high) =
-                along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+            let [low, high] = extent(places.iter().map(|(at, _)| at[axis]));
             high - low
         });
         let [here, there] = [own, fitted].map(|poses| moved(&estimated.model, &every(&poses, POSES), target));

@@ -1,8 +1,7 @@
 //! Parallel products and factors of large matrices, bitwise reproducible for any number of threads: work is divided into parts of
 //! fixed size, each of them done by one thread.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt;
+use crate::identification::scaled_cholesky::cholesky_in_place;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -104,19 +103,9 @@ fn lower_product(a: MatRef<'_, f64>, out: &mut DMatrix<f64>, how: Accum, factor:
 
 /// Replaces a positive definite matrix by its lower Cholesky factor; `false` if it is not positive definite.
 pub(super) fn factored(a: &mut DMatrix<f64>) -> bool {
-    let n = a.nrows();
-    let request = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
-    let mut memory = MemBuffer::new(request);
-    let place = MatMut::from_column_major_slice_mut(a.as_mut_slice(), n, n);
-    let done = llt::factor::cholesky_in_place(
-        place,
-        Default::default(),
-        Par::Seq,
-        MemStack::new(&mut memory),
-        Default::default(),
-    );
+    let done = cholesky_in_place(a);
     a.fill_upper_triangle(0.0, 1);
-    done.is_ok() && a.diagonal().iter().all(|d| *d > 0.0)
+    done && a.diagonal().iter().all(|d| *d > 0.0)
 }
 
 /// Solves L Lᵀ x = b.

@@ -33,8 +33,13 @@ pub(super) fn factorise(matrix: &DMatrix<f64>) -> Option<(ScaledCholesky, f64)> 
     if size.iter().any(|s| !s.is_finite()) {
         return None;
     }
-    let unit = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * size[i] * size[j]);
-    let factor = if unit.nrows() > MANY_COLUMNS { blocked_cholesky(unit)? } else { Cholesky::new(unit)? };
+    let mut unit =
+        DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * size[i] * size[j]);
+    let factor = if unit.nrows() > MANY_COLUMNS {
+        cholesky_in_place(&mut unit).then(|| Cholesky::pack_dirty(unit))?
+    } else {
+        Cholesky::new(unit)?
+    };
     let determinant: f64 = factor.l_dirty().diagonal().iter().map(|v| 2.0 * v.ln()).sum();
     let scaling: f64 = size.iter().map(|s| 2.0 * s.ln()).sum();
     Some((ScaledCholesky { factor, size }, determinant - scaling))
@@ -45,15 +50,14 @@ pub(super) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     if a.ncols() > MANY_COLUMNS { a.transpose() * a } else { a.tr_mul(a) }
 }
 
-/// Cholesky factor of a large matrix, in blocks.
-fn blocked_cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+/// Replaces the lower triangle by its Cholesky factor, in blocks; `false` where the matrix has none.
+pub(crate) fn cholesky_in_place(matrix: &mut DMatrix<f64>) -> bool {
     let n = matrix.nrows();
     let request = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
     let mut memory = MemBuffer::new(request);
     let place = MatMut::from_column_major_slice_mut(matrix.as_mut_slice(), n, n);
     let stack = MemStack::new(&mut memory);
-    llt::factor::cholesky_in_place(place, Default::default(), Par::Seq, stack, Default::default()).ok()?;
-    Some(Cholesky::pack_dirty(matrix))
+    llt::factor::cholesky_in_place(place, Default::default(), Par::Seq, stack, Default::default()).is_ok()
 }
 
 /// (L Lᵀ)⁻¹ of a large factor, in blocks: XᵀX with X = L⁻¹.

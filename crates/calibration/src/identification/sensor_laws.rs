@@ -18,6 +18,7 @@ use super::fit::Fitted;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::empirical::second_degree;
 use truegrind_arm::condition::Condition;
+use truegrind_math::statistics::extent;
 
 /// A law of the sensor's error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -111,9 +112,7 @@ fn pulley<'a>(fitted: &'a Fitted, dataset: &'a Dataset) -> ErrorsAt<'a> {
 }
 
 fn drum(dataset: &Dataset) -> ErrorsAt<'_> {
-    let all = dataset.rows.iter().map(|row| row.reading.place_mm().x);
-    let (low, high) =
-        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), d| (low.min(d), high.max(d)));
+    let [low, high] = extent(dataset.rows.iter().map(|row| row.reading.place_mm().x));
     Box::new(move |row| {
         let t = (2.0 * dataset.rows[row].reading.place_mm().x - low - high) / (high - low).max(1.0);
         lengths(&[0.5 * (3.0 * t * t - 1.0), 0.5 * (5.0 * t * t * t - 3.0 * t)].map(|v| HARMONIC_MM * v))

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 
 use super::dataset::Dataset;
 use super::row_list::row_list;
+use truegrind_math::statistics::extent;
 
 /// Share of the logged time within which a clock that goes back is near its first value: it was restarted.
 const NEAR_START: f64 = 0.01;
@@ -35,8 +36,7 @@ fn by_clock(mut dataset: Dataset, times: &[f64]) -> Dataset {
     if back.is_empty() {
         return dataset;
     }
-    let [first, last] =
-        times.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(*t), high.max(*t)]);
+    let [first, last] = extent(times.iter().copied());
     let near = first + NEAR_START * (last - first);
     if times[0] <= near && back.iter().all(|&i| times[i] <= near) {
         let numbers: Vec<usize> = back.iter().map(|&i| dataset.rows[i].number).collect();

@@ -9,7 +9,7 @@ use truegrind_arm::estimated::{EstimatedParameter, Judgement};
 use truegrind_arm::parameter::display_unit;
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis};
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_math::statistics::ErrorSummary;
+use truegrind_math::statistics::{ErrorSummary, extent};
 
 pub(super) fn markdown(scene: &MeasuredScene<'_>, shape: Option<&Shape>) -> String {
     let dataset = scene.dataset;
@@ -150,9 +150,7 @@ fn ranges(text: &mut String, scene: &MeasuredScene<'_>) {
         if scene.planned { "planned" } else { "measured" }
     );
     for joint in 0..6 {
-        let angles = scene.dataset.rows.iter().map(|r| r.joints[joint].to_degrees());
-        let (low, high) = angles
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high): (f64, f64), a| (low.min(a), high.max(a)));
+        let [low, high] = extent(scene.dataset.rows.iter().map(|r| r.joints[joint].to_degrees()));
         let limits = &scene.arm.limits;
         let _ = writeln!(
             text,

@@ -679,7 +679,7 @@ fn named_axes(block: &Block<'_>) -> u8 {
 }
 
 /// Whether this is the name of an axis, with or without the I of an increment.
-fn is_axis_name(name: &[u8]) -> bool {
+pub(super) fn is_axis_name(name: &[u8]) -> bool {
     match name {
         [letter] | [b'I' | b'i', letter] => b"XYZABCUVW".contains(&letter.to_ascii_uppercase()),
         _ => false,

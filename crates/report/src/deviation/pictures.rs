@@ -10,6 +10,7 @@ use crate::plot::{
     distinguishable,
 };
 use truegrind_compensation::deviation::{After, MotionStatus, PathPoint, PathReport};
+use truegrind_math::statistics;
 
 /// Largest number of plotted points; of each group of neighbours the largest deviation is kept.
 const POINTS: usize = 2000;
@@ -248,11 +249,8 @@ fn plan(reports: &[&PathReport]) -> Option<Figure> {
 /// The two axes of the work object along which the path extends furthest.
 fn widest(report: &PathReport) -> Option<[usize; 2]> {
     let extent = |axis: usize| {
-        let ends = report
-            .cut()
-            .map(|point| intended(point)[axis])
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |ends, v| (ends.0.min(v), ends.1.max(v)));
-        ends.1 - ends.0
+        let [low, high] = statistics::extent(report.cut().map(|point| intended(point)[axis]));
+        high - low
     };
     if report.points.is_empty() {
         return None;

@@ -1,6 +1,7 @@
 //! Detection of coinciding curves, of which only one is drawn.
 
 use super::graph::Series;
+use truegrind_math::statistics::extent;
 
 /// Width of a line as a share of the height of the plot.
 const LINE: f64 = 0.005;
@@ -11,9 +12,8 @@ pub fn distinguishable(
     series: Vec<Series>,
     counts: impl Fn(f64) -> bool,
 ) -> (Vec<Series>, Vec<(String, String)>) {
-    let heights = || series.iter().flat_map(|s| &s.points).map(|p| p[1]).filter(|y| y.is_finite());
-    let (low, high) =
-        heights().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));
+    let heights = series.iter().flat_map(|s| &s.points).map(|p| p[1]).filter(|y| y.is_finite());
+    let [low, high] = extent(heights);
     let line = LINE * (high - low);
     let agree = |a: &Series, b: &Series| {
         let near =

@@ -6,6 +6,7 @@ use super::frame::{EDGE, Frame, Inside};
 use super::ink::ColorMap;
 use super::pen::{Marker, PIXEL, Paint, Pen, Point, TITLE};
 use super::scale::{Ends, Scale};
+use truegrind_math::statistics::extent;
 
 /// Number of colours along a path; all pieces of one colour are a single element.
 const SHADES: usize = 96;
@@ -50,10 +51,8 @@ impl PlanView {
         // The height of the panels follows the aspect ratio of the paths.
         let span = |axis: usize| {
             let ends = self.paths.iter().flat_map(|path| &path.points).map(|point| point[axis]);
-            let ends = ends
-                .filter(|end| end.is_finite())
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], end| [low.min(end), high.max(end)]);
-            ends[1] - ends[0]
+            let [low, high] = extent(ends.filter(|end| end.is_finite()));
+            high - low
         };
         let aspect = span(1) / span(0);
         let width = 800.0 / columns as f64 - 75.0;

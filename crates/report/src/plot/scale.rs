@@ -1,6 +1,7 @@
 //! Scales: range of an axis, ticks and labels.
 
 use super::axis::Axis;
+use truegrind_math::statistics::extent;
 
 /// Smaller numbers are drawn as zero, since the powers of ten to scale them do not exist.
 const MIN_DRAWN: f64 = 1e-290;
@@ -36,9 +37,7 @@ impl Scale {
     /// Scale of an axis for the values on it, with at most about `ticks` ticks.
     pub(super) fn of(axis: &Axis, values: impl Iterator<Item = f64>, ends: Ends, ticks: usize) -> Self {
         let usable = |value: &f64| value.is_finite() && (!axis.log || *value > 0.0);
-        let [mut low, mut high] = values
-            .filter(usable)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
+        let [mut low, mut high] = extent(values.filter(usable));
         if low > high {
             [low, high] = if axis.log { [0.1, 10.0] } else { [0.0, 1.0] };
         }

@@ -6,7 +6,7 @@ use crate::nc::expression::literal;
 use crate::nc::modal_state::OrientationMode;
 use crate::nc::parser::word;
 use crate::nc::syntax::{NcTree, Syntax, Word, WordValue};
-use crate::nc::task::{BlockContext, Task};
+use crate::nc::task::{BlockContext, Task, is_axis_name};
 use crate::nc::token::Token;
 
 /// The target words of a block.
@@ -171,11 +171,6 @@ fn number_of(tree: &NcTree<'_>, word: &Word<'_>) -> Option<f64> {
         WordValue::Literal { number, .. } => literal(tree.text(number)),
         _ => None,
     }
-}
-
-fn is_axis_name(name: &[u8]) -> bool {
-    matches!(name, [b'X'..=b'Z' | b'A'..=b'C' | b'U'..=b'W'])
-        || matches!(name, [b'I', b'X'..=b'Z' | b'A'..=b'C' | b'U'..=b'W'])
 }
 
 fn may_turn(name: &[u8]) -> bool {

@@ -47,7 +47,7 @@ impl Recipe {
             ("noise.sigma_deg", self.noise.sigma_deg),
             ("noise.joints_deg", self.noise.joints_deg),
         ] {
-            SIGMA.check(|| key.to_owned(), sigma)?;
+            SIGMA.check(key, sigma)?;
         }
         FREEDOM.check_all("noise.student_t", &self.noise.student_t)?;
         for (key, step) in [
@@ -70,7 +70,7 @@ impl Recipe {
                 ("beta_deg", ANGLE_SIGMA_DEG, random.beta_deg),
                 ("theta_deg", ANGLE_SIGMA_DEG, random.theta_deg),
             ] {
-                bound.check(|| format!("random.{key}"), value)?;
+                bound.check(format_args!("random.{key}"), value)?;
             }
         }
         for link in &self.arm.link {
@@ -84,7 +84,7 @@ impl Recipe {
                 ("beta_deg", ANGLE_OFF_DEG, link.beta_deg),
                 ("theta_deg", ANGLE_OFF_DEG, link.theta_deg),
             ] {
-                bound.check(|| format!("link.{key} of joint {}", link.joint), value)?;
+                bound.check(format_args!("link.{key} of joint {}", link.joint), value)?;
             }
         }
         effects(&self.arm.effect)?;
@@ -98,7 +98,7 @@ impl Recipe {
     fn check_poses(&self) -> Result<(), InvalidValue> {
         let repeats = match &self.poses {
             Poses::Random { margin_deg, min_deg, max_deg, repeats, .. } => {
-                JOINT_DEG.check(|| "margin_deg".to_owned(), *margin_deg)?;
+                JOINT_DEG.check("margin_deg", *margin_deg)?;
                 JOINT_DEG.check_all("min_deg", min_deg.iter().flatten())?;
                 JOINT_DEG.check_all("max_deg", max_deg.iter().flatten())?;
                 *repeats
@@ -141,16 +141,16 @@ fn conditions(conditions: &RunConditions) -> Result<(), InvalidValue> {
         if conditions.hours.is_none() {
             return Err(InvalidValue::new("temperature", "no hours", "`hours` beside a temperature"));
         }
-        TEMPERATURE_C.check(|| "temperature.start_c".to_owned(), warm.start_c)?;
-        TEMPERATURE_C.check(|| "temperature.end_c".to_owned(), warm.end_c)?;
-        TIME_H.check(|| "temperature.time_constant_h".to_owned(), warm.time_constant_h)?;
+        TEMPERATURE_C.check("temperature.start_c", warm.start_c)?;
+        TEMPERATURE_C.check("temperature.end_c", warm.end_c)?;
+        TIME_H.check("temperature.time_constant_h", warm.time_constant_h)?;
     }
     MASS_KG.check_all("payload_kg", &conditions.payload_kg)?;
     LENGTH_MM.check_all("payload_centre_mm", &conditions.payload_centre_mm)
 }
 
 fn frame(key: &str, frame: &Frame) -> Result<(), InvalidValue> {
-    POSITION_MM.check_all(&format!("{key}.position_mm"), &frame.position_mm)?;
+    POSITION_MM.check_all(format_args!("{key}.position_mm"), &frame.position_mm)?;
     let length = frame.wxyz.iter().map(|v| v * v).sum::<f64>().sqrt();
     if (1e-3..=1e3).contains(&length) {
         return Ok(());
@@ -198,18 +198,18 @@ fn faults(list: &[Fault]) -> Result<(), InvalidValue> {
 
 fn numbers(fault: &Fault) -> Result<(), InvalidValue> {
     match fault {
-        Fault::SensorZeroShift { offset_mm, .. } => POSITION_MM.check(|| "offset_mm".to_owned(), *offset_mm),
+        Fault::SensorZeroShift { offset_mm, .. } => POSITION_MM.check("offset_mm", *offset_mm),
         Fault::SensorFrameShift { shift_mm, turn_deg, .. } => {
             POSITION_MM.check_all("shift_mm", shift_mm)?;
             TURN_DEG.check_all("turn_deg", turn_deg)
         }
         Fault::ToolShift { shift_mm, .. } => LENGTH_MM.check_all("shift_mm", shift_mm),
-        Fault::SensorScale { error } => SCALE.check(|| "error".to_owned(), *error),
+        Fault::SensorScale { error } => SCALE.check("error", *error),
         Fault::CableSag { weight_over_tension_per_m } => {
-            SAG_PER_M.check(|| "weight_over_tension_per_m".to_owned(), *weight_over_tension_per_m)
+            SAG_PER_M.check("weight_over_tension_per_m", *weight_over_tension_per_m)
         }
-        Fault::Outliers { size_mm, .. } => POSITION_MM.check(|| "size_mm".to_owned(), *size_mm),
+        Fault::Outliers { size_mm, .. } => POSITION_MM.check("size_mm", *size_mm),
         Fault::ReadoutMismatch { shift_mm, .. } => POSITION_MM.check_all("shift_mm", shift_mm),
-        Fault::PayloadChange { payload_kg, .. } => MASS_KG.check(|| "payload_kg".to_owned(), *payload_kg),
+        Fault::PayloadChange { payload_kg, .. } => MASS_KG.check("payload_kg", *payload_kg),
     }
 }
