@@ -146,7 +146,7 @@ fn in_words(effect: CauseKind) -> Option<&'static str> {
         JointStiffness => "measure the same ten poses with and without a load: what changes is the stiffness",
         PayloadChange => "weigh the tool, and measure the same ten poses with and without it",
         GearTwoJoints | GearTransmission => {
-            "turn each of these joints alone through its whole range in steps of a few degrees, and read at each: what returns with the angle \
+            "turn each joint in question alone through its whole range in steps of a few degrees, and read at each: what returns with the angle \
              is the gear"
         }
         Latency => "measure the same ten poses once at rest and once in motion: what changes is the clock",
