@@ -115,7 +115,7 @@ pub(crate) fn run() -> ExitCode {
             let code = if error.use_stderr() { 2 } else { 0 };
             if error.use_stderr() {
                 // The message quotes the arguments, which may hold file names from a shell pattern.
-                terminal::print_message_lines(&with_decimal_point(error.render().to_string()));
+                terminal::print_message_lines(&with_number_tip(error.render().to_string()));
             } else {
                 let _ = error.print();
             }
@@ -133,12 +133,18 @@ pub(crate) fn run() -> ExitCode {
     }
 }
 
-/// Says how a number is written, where one has a decimal comma.
-fn with_decimal_point(mut message: String) -> String {
+/// Says how numbers are written, where one has a decimal comma or several stand apart.
+fn with_number_tip(mut message: String) -> String {
     let value = message.split_once("invalid value '").and_then(|(_, rest)| rest.split_once('\''));
     let comma = value.map(|(value, _)| value.replace(',', ".")).filter(|value| value.parse::<f64>().is_ok());
     if let Some(value) = comma.filter(|_| message.contains("invalid float literal")) {
         message.push_str(&format!("\n  tip: a number has a decimal point, not a comma: {value}\n"));
+    }
+    let apart = message.split_once("unexpected argument '").and_then(|(_, rest)| rest.split_once('\''));
+    if apart.is_some_and(|(value, _)| value.parse::<f64>().is_ok()) {
+        message.push_str(
+            "\n  tip: several numbers of one option stand together, with commas between them: 40,0,60\n",
+        );
     }
     message
 }

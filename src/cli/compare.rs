@@ -18,6 +18,7 @@ use super::exit_status::ExitStatus;
 use super::files::Batch;
 use super::identify::{Angles, DataArguments};
 use super::inputs::{self, UrdfLinks};
+use super::output_extension::csv_file;
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::terminal::{print_message, print_message_lines, print_result, width};
@@ -52,7 +53,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     allow_odd_units: bool,
     /// Write computing times as CSV. Other files contain them only with --timings, since they differ from run to run.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = csv_file)]
     times: Option<PathBuf>,
     /// Show computing times on stderr and in the reports, which then differ from run to run.
     #[arg(long)]

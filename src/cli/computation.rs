@@ -11,7 +11,7 @@ use super::progress::Spinner;
 #[derive(Debug, Clone, Args)]
 pub(super) struct Common {
     /// Seed of all random numbers.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     pub(super) seed: u64,
     /// Number of threads; the result does not depend on it.
     #[arg(long)]

@@ -15,6 +15,7 @@ use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind::programs::motion::Listing;
 use truegrind::programs::nc::setup::Setup;
+use truegrind::programs::reading::{Language, Program};
 use truegrind::report::deviation as view;
 use truegrind::report::status::Status;
 use truegrind::surfaces::SurfaceFile;
@@ -363,6 +364,7 @@ impl DeviationContext<'_> {
             }
             _ => programs.name(),
         };
+        refuse_other_language(&name, &task, original.as_ref())?;
         refuse_other_original(&name, task.listing(), original.as_ref().map(|original| original.listing()))?;
         // The original defines the intended path.
         let cell = self.arguments;
@@ -409,6 +411,25 @@ impl DeviationContext<'_> {
             used.join(&Used::by(original.listing(), self.cell));
         }
         Ok(ProgramReports { name: job.name(), reports, used: Some(used), failed: None })
+    }
+}
+
+/// Refuses an original in another language.
+fn refuse_other_language(
+    name: &str,
+    task: &Program<'_>,
+    original: Option<&Program<'_>>,
+) -> anyhow::Result<()> {
+    let words = |program: &Program<'_>| match program.language() {
+        Language::Rapid => "RAPID",
+        Language::Nc => "NC code",
+    };
+    match original.map(words) {
+        Some(other) if other != words(task) => bail!(
+            "{name}: this is {}, but the program of --intended is {other}: give the program from which it was rewritten",
+            words(task)
+        ),
+        _ => Ok(()),
     }
 }
 

@@ -351,8 +351,12 @@ fn imported(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<Dataset> 
     let options =
         import::Options { sheet: arguments.sheet.clone(), allow_odd_units: arguments.allow_odd_units };
     let name = files::name(&arguments.data);
+    // A table may have any name, so only one that cannot be read is a program.
+    let program = || inputs::refuse_program(&arguments.data, "measurements (.csv or .xlsx)").err();
     Ok(match (&arguments.points.points, arguments.points.clocks()?) {
-        (None, _) => import::read(&name, bytes, &options)?,
+        (None, _) => {
+            import::read(&name, bytes, &options).map_err(|e| program().unwrap_or_else(|| e.into()))?
+        }
         (Some(points), clocks) => {
             let (export, exported) = (files::name(points), files::read(points)?);
             match clocks {

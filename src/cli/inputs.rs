@@ -107,6 +107,9 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     let path = Path::new(argument);
     let text = files::read_text(path)?;
     let arm = Estimated::from_toml(&text).map_err(|e| {
+        if let Err(program) = refuse_program(path, "a model file as written by `truegrind identify -o`") {
+            return program;
+        }
         if let Some(other) = other_kind(&text) {
             return anyhow!(
                 "{argument}: {other}; expected a model file as written by `truegrind identify -o`"
@@ -147,9 +150,9 @@ fn other_kind(text: &str) -> Option<&'static str> {
 pub(super) fn refuse_program(path: &Path, expected: &str) -> anyhow::Result<()> {
     match Language::by_name(&files::name(path)) {
         Some(Language::Rapid) => {
-            bail!("{}: this is a RAPID program; expected {expected} (.toml)", path.display())
+            bail!("{}: this is a RAPID program; expected {expected}", path.display())
         }
-        Some(Language::Nc) => bail!("{}: this is an NC program; expected {expected} (.toml)", path.display()),
+        Some(Language::Nc) => bail!("{}: this is an NC program; expected {expected}", path.display()),
         None => Ok(()),
     }
 }

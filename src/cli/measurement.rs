@@ -9,6 +9,7 @@ use truegrind::calibration::measurement::import::template;
 use super::exit_status::ExitStatus;
 use super::files::{Batch, spare_filled_in};
 use super::inputs::{self, UrdfLinks};
+use super::output_extension::csv_file;
 use super::terminal::print_message;
 
 /// Arguments of `measurement`.
@@ -35,7 +36,7 @@ struct Template {
     #[arg(long, value_enum, default_value_t = Reads::Position)]
     sensor: Reads,
     /// CSV file to write. Default: stdout.
-    #[arg(short, long, value_name = "FILE.csv", default_value = "-")]
+    #[arg(short, long, value_name = "FILE.csv", default_value = "-", value_parser = csv_file)]
     output: PathBuf,
 }
 

@@ -1,6 +1,7 @@
-//! File extensions of written programs: controller and reader infer the language from them.
+//! File extensions of what is written: controller, reader and spreadsheet infer the language from them.
 
-use std::path::Path;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use truegrind::programs::nc::dialect::Dialect;
@@ -39,9 +40,15 @@ pub(super) fn refuse_no_model(output: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Refuses an output with an unknown extension.
-pub(super) fn refuse_unknown(output: &Path) -> anyhow::Result<()> {
-    language_of(output).map(drop)
+/// The name of a CSV file. A text named as a workbook is opened by no spreadsheet.
+pub(super) fn csv_file(name: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(name);
+    let is_workbook =
+        |extension: &OsStr| ["xlsx", "xls", "xlsb", "ods"].iter().any(|e| extension.eq_ignore_ascii_case(e));
+    if path.extension().is_some_and(is_workbook) {
+        return Err("CSV is written here, which a spreadsheet opens under the extension .csv".to_owned());
+    }
+    Ok(path)
 }
 
 /// Refuses an output with the extension of an NC program.

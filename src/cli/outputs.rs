@@ -8,6 +8,7 @@ use truegrind::report::format;
 use truegrind::report::table::Table;
 
 use super::files::{Batch, is_stdout};
+use super::output_extension::csv_file;
 use super::terminal::{print_message_lines, print_result, width};
 
 /// Tables and pages. An option without a file name writes to stdout.
@@ -17,7 +18,7 @@ pub(super) struct Pages {
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub(super) json: Option<PathBuf>,
     /// Write the table as CSV.
-    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-", value_parser = csv_file)]
     pub(super) csv: Option<PathBuf>,
     /// Write the table as an Apache Parquet file.
     #[arg(long, value_name = "FILE")]

@@ -9,14 +9,12 @@ use truegrind::programs::nc;
 use truegrind::programs::nc::dialect::Dialect;
 use truegrind::programs::nc::orientation::Angles;
 use truegrind::programs::rapid::writer;
-use truegrind::programs::reading::Language;
 use truegrind::robots::Robot;
 use truegrind::surfaces::SurfaceFile;
 
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs::{self, UrdfLinks};
-use super::output_extension;
 use super::robot_match;
 use super::terminal::print_message;
 use truegrind::compensation::cell::nc_setup::angle_convention;
@@ -46,32 +44,35 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     // An output that is an input is reported first.
     files::expect(&arguments.surface)?;
     Batch::check(&[], &[&arguments.output])?;
-    output_extension::refuse_unknown(&arguments.output)?;
+    let control = control_of(&arguments.output)?;
     let mut path = toolpath(&file, &robot.model, &robot.sheet.name)?;
     path.draft.named_targets = !arguments.inline;
-    let extension =
-        arguments.output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-    let bytes = match extension.as_deref() {
-        Some("nc") => nc::writer::write(&path.draft, Dialect::Fanuc, angles_of(&robot))?,
-        Some("mpf" | "spf") => nc::writer::write(&path.draft, Dialect::Siemens, angles_of(&robot))?,
-        Some("ngc" | "h") => bail!(
-            "{}: new programs cannot be written for this control; expected .mod, .nc or .mpf",
-            arguments.output.display()
-        ),
-        _ if Language::by_name(&files::name(&arguments.output)) == Some(Language::Nc) => bail!(
-            "{}: the extension does not determine the control; expected .mod (RAPID), .nc (Fanuc style) or .mpf (840D)",
-            arguments.output.display()
-        ),
-        _ => writer::write(&path.draft)?,
+    let bytes = match control {
+        Some(control) => nc::writer::write(&path.draft, control, angles_of(&robot))?,
+        None => writer::write(&path.draft)?,
     };
     let mut batch = Batch::sparing([&arguments.surface]);
     batch.add(&arguments.output, bytes);
     batch.write()?;
     report_toolpath(&path, &robot, &arguments.output);
-    if Language::by_name(&files::name(&arguments.output)) != Some(Language::Nc) {
+    if control.is_none() {
         robot_match::note_other_language(&robot);
     }
     Ok(ExitStatus::Done)
+}
+
+/// The control for which an output is written; `None` for RAPID, which stdout gets too.
+fn control_of(output: &Path) -> anyhow::Result<Option<Dialect>> {
+    let extension = output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("nc") => Ok(Some(Dialect::Fanuc)),
+        Some("mpf" | "spf") => Ok(Some(Dialect::Siemens)),
+        Some("mod" | "modx" | "prg" | "sys") | None => Ok(None),
+        Some(other) => bail!(
+            "{}: new programs are written as RAPID (.mod), Fanuc style (.nc) or 840D (.mpf), not as .{other}: choose one of these extensions",
+            output.display()
+        ),
+    }
 }
 
 /// Meaning of A, B and C: that of the robot file, or else rotations about the fixed x, y and z axes (W, P, R).
@@ -94,7 +95,8 @@ fn report_toolpath(path: &Toolpath, robot: &Robot, output: &Path) {
 pub(super) fn surface(path: &Path) -> anyhow::Result<SurfaceFile> {
     let bytes = files::read(path)?;
     let name = path.display().to_string();
-    inputs::refuse_program(path, "a surface file")?;
+    inputs::refuse_program(path, "a surface file (.toml)")?;
     let resolve = |mesh: &str| inputs::read_beside(path, mesh).map_err(|e| format!("{e:#}"));
-    SurfaceFile::read(&name, &bytes, resolve).map_err(|e| anyhow!("{e}"))
+    SurfaceFile::read(&name, &bytes, resolve)
+        .map_err(|e| anyhow!("{e}; expected a surface file, such as surfaces/blade.toml"))
 }

@@ -26,6 +26,7 @@ use super::measurement::Reads;
 use super::output_extension;
 use super::outputs::Outputs;
 use super::progress::Spinner;
+use super::robot_match;
 use super::stated_frames::{StatedFrameArguments, numbers};
 use super::terminal::print_message;
 
@@ -176,6 +177,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
             ..ProgramSettings::default()
         };
         batch.add(path, writer::write(&draft(&planned, &setup, &drive))?);
+        robot_match::note_other_language(&robot);
     }
     batch.write()?;
     let rough = planned.rows.iter().any(|row| row.cable_unclear);
@@ -187,6 +189,9 @@ const MAX_POSES: usize = 2000;
 
 /// Largest number of candidates; more do not improve the design.
 const MAX_CANDIDATES: usize = 100_000;
+
+/// Noisier sensors identify no arm; micrometres are meant (mm).
+const MAX_SIGMA_MM: f64 = 10.0;
 
 /// The space that the arm must keep out of.
 fn space(arguments: &Arguments, usual: KeepOut, reach_mm: f64) -> anyhow::Result<KeepOut> {
@@ -223,6 +228,9 @@ fn check_numbers(arguments: &Arguments, sigma: f64, usual_poses: usize) -> anyho
         if !(value > 0.0 && value.is_finite()) {
             bail!("{name} {value}: expected a number above 0");
         }
+    }
+    if sigma > MAX_SIGMA_MM {
+        bail!("--sigma {sigma}: expected mm, up to {MAX_SIGMA_MM} (30 µm are 0.03)");
     }
     for (name, value) in [
         ("--settle", arguments.settle),
@@ -305,7 +313,7 @@ fn options(arguments: &Arguments, robot: &str, setup: &MeasurementSetup<'_>) -> 
         None => None,
         Some(text) => match numbers("--range", text)?[..] {
             [low, high] if 0.0 <= low && low < high => Some([low, high]),
-            _ => bail!("--range {text}: expected min,max (mm)"),
+            _ => bail!("--range {text}: expected the shortest and the longest distance, min,max (mm)"),
         },
     };
     let clearance_mm = match arguments.clearance {

@@ -13,6 +13,7 @@ use truegrind::robots::foreign::Kind;
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs;
+use super::output_extension::csv_file;
 use super::terminal::print_message;
 
 /// Arguments of `simulate`.
@@ -21,13 +22,13 @@ pub(super) struct Arguments {
     /// Recipe: the actual arm, the measured poses and the sensor.
     recipe: PathBuf,
     /// Measurements to write; `-` prints them.
-    #[arg(short, long, value_name = "DATA.csv")]
+    #[arg(short, long, value_name = "DATA.csv", value_parser = csv_file)]
     output: PathBuf,
     /// Also write the simulated actual arm, for `deviation --actual`.
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
     /// Seed of poses and noise, instead of that of the recipe; the arm stays the same.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     seed: Option<u64>,
 }
 
@@ -37,7 +38,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Batch::check(&[&arguments.recipe], &targets)?;
     let text = files::read_text(&arguments.recipe)?;
     let name = arguments.recipe.display().to_string();
-    inputs::refuse_program(&arguments.recipe, "a recipe")?;
+    inputs::refuse_program(&arguments.recipe, "a recipe (.toml)")?;
     let Recipe { about, conditions, .. } = Recipe::parse(&text, &name)?;
     let simulation = simulation(&text, &name, arguments.seed)?;
     let mut batch = Batch::sparing([&arguments.recipe]);

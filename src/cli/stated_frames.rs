@@ -42,7 +42,7 @@ pub(super) struct FramePriorArguments {
     /// corrected.
     #[arg(long, value_name = "MM[,DEG]", allow_hyphen_values = true)]
     frame_sigma: Option<String>,
-    /// Uncertainty of --touched-point (mm, standard deviation). Default: 50 mm, as of a point that is not stated.
+    /// Uncertainty of --touched-point (mm, standard deviation). Default: 50 mm, the same as for a point that is not stated.
     #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "touched_point")]
     touched_sigma: Option<f64>,
 }
@@ -294,7 +294,10 @@ pub(super) fn numbers(option: &str, text: &str) -> anyhow::Result<Vec<f64>> {
     text.split(',')
         .map(|cell| match cell.trim().parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(anyhow!("{option} {text}: `{}` is not a number", cell.trim())),
+            _ => Err(anyhow!(
+                "{option} {text}: `{}` is not a number; expected numbers with a comma between them, such as 40,0,60",
+                cell.trim()
+            )),
         })
         .collect()
 }

@@ -393,6 +393,19 @@ fn entries_of_a_cell_file_that_no_program_uses_are_named() {
             assert!(note.contains(entry), "{note}");
         }
     }
+    // NC programs know the tools of the cell file, and use those that they call.
+    let program = "%\nO0001\n(truegrind angles wpr)\nG90 G21 G17\nT1 M6\nG54\nG43.4 H1\nG0 X0. Y0. Z20. A180. B0. C0.\nG1 X20. F600.\nM30\n%\n";
+    let frame = |kind: &str, name: &str, at: &str| {
+        format!("[[{kind}]]\nname = \"{name}\"\norigin = \"metrology\"\nposition_mm = {at}\n")
+    };
+    fs::write(at.join("face.nc"), program).unwrap();
+    let cell =
+        [("tool", "T1", "[0, 0, 120]"), ("tool", "T2", "[0, 0, 90]"), ("wobj", "G54", "[380, 0, 300]")];
+    fs::write(at.join("nc.toml"), cell.map(|(kind, name, at)| frame(kind, name, at)).concat()).unwrap();
+    let given = ["compensate", "face.nc", "--dry-run", "--model", "model.toml", "--cell", "nc.toml"];
+    let (_, _, err) = truegrind(at, &given);
+    let notes: Vec<&str> = err.lines().filter(|line| line.contains("cell file:")).collect();
+    assert!(notes.len() == 1 && notes[0].contains("tool \"T2\" is not used by any program"), "{err}");
 }
 
 /// What is left beside corrected motions shows alone, in a folder, and in a report of deviations.

@@ -6,6 +6,7 @@ use super::document::{Block, Document, KeyFigure, PageVerdict};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::parameter::Parameter;
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::measurement::dataset::Reading;
 use truegrind_math::sentence::listed;
 use truegrind_planning::poses::field::FieldUncertainty;
@@ -175,7 +176,7 @@ fn verdict(plan: &Plan, setup: &MeasurementSetup<'_>) -> PageVerdict {
     if rough > 0 {
         reasons.insert(
             1,
-            format!("the cable must be unhooked between poses {rough} times; the table of rows shows where"),
+            format!("the cable must be unhooked between poses {rough} times; the comments of the program (-o) and the table of rows (--csv, --html) show where"),
         );
     }
     let (status, headline) = match rough {
@@ -192,7 +193,7 @@ fn verdict(plan: &Plan, setup: &MeasurementSetup<'_>) -> PageVerdict {
 fn parted(parting: &Parting, plan: &Plan) -> String {
     let [one, other] = parting.alike.each_ref().map(named);
     let begin = format!(
-        "{} in question: these rows part the two causes that are most alike, {one} and {other}, with λ = {:.0}, where {DECIDES:.0} decide",
+        "{} is in question: these rows separate the two causes that are most alike, {one} and {other}, with λ = {:.0}, where {DECIDES:.0} decide",
         named(&parting.finding),
         parting.lambda
     );
@@ -223,7 +224,7 @@ fn parted(parting: &Parting, plan: &Plan) -> String {
         remedies
             .push(format!("the effect itself shows with λ = {:.0} only: a less noisy sensor", parting.alone));
     }
-    remedies.push("another place of the sensor or of the target may part them too".to_owned());
+    remedies.push("another place of the sensor or of the target may separate them too".to_owned());
     format!("{begin}: they will probably not decide{others}. What would: {}", remedies.join("; "))
 }
 
@@ -236,10 +237,11 @@ const MORE: f64 = 1.5;
 /// A cause with its joints.
 fn named(cause: &CandidateCause) -> String {
     let joints: Vec<String> = cause.joints.iter().map(|joint| (joint + 1).to_string()).collect();
+    let part = if cause.effect == CauseKind::LinkBending { "link" } else { "joint" };
     match joints.as_slice() {
         [] => cause.effect.as_str().to_owned(),
-        [one] => format!("{} of joint {one}", cause.effect),
-        several => format!("{} of joints {}", cause.effect, listed(several)),
+        [one] => format!("{} of {part} {one}", cause.effect),
+        several => format!("{} of {part}s {}", cause.effect, listed(several)),
     }
 }
 

@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
     pub(super) programs: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) grouping: Grouping,
-    /// Estimated arm (a model file), or the word `nominal`, with which no byte changes.
+    /// Estimated arm (a model file), or the word `nominal`, which changes nothing.
     #[arg(long)]
     pub(super) model: String,
     #[command(flatten)]

@@ -362,14 +362,61 @@ fn a_file_in_the_wrong_place_is_told_what_it_is() {
             &["identify", "poses.csv", "--robot", "abb-irb-120", "-o", "x.xlsx"],
             ["a model file is TOML", "not .xlsx"],
         ),
+        (
+            &["identify", "blade.mod", "--robot", "abb-irb-120"],
+            ["this is a RAPID program", "expected measurements"],
+        ),
+        (
+            &["compensate", "blade.mod", "--model", "blade.nc", "-o", "x.mod"],
+            ["this is an NC program", "expected a model file"],
+        ),
+        (&["simulate", "model.toml", "-o", "x.csv"], ["model.toml: not a recipe: line", "docs/simulate.md"]),
+        (&["simulate", "model.toml", "-o", "x.xlsx"], ["CSV is written here", "x.xlsx"]),
+        (
+            &["identify", "poses.csv", "--robot", "abb-irb-120", "--csv", "x.xlsx"],
+            ["CSV is written here", "x.xlsx"],
+        ),
+        (
+            &["deviation", "real.mod", "--intended", "blade.nc", "--model", "model.toml"],
+            ["this is RAPID, but the program of --intended is NC code", "from which it was rewritten"],
+        ),
+        (
+            &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "x.h"],
+            ["written as RAPID (.mod), Fanuc style (.nc) or 840D (.mpf)", "not as .h"],
+        ),
+        (
+            &["plan", "--robot", "abb-irb-120", "--sensor", "tracker", "--sigma", "30"],
+            ["expected mm, up to 10", "30 µm are 0.03"],
+        ),
+        (
+            &["identify", "poses.csv", "--robot", "abb-irb-120", "--touched-point", "40", "0", "60"],
+            ["unexpected argument '0'", "with commas between them: 40,0,60"],
+        ),
+        (
+            &["identify", "poses.csv", "--robot", "abb-irb-120", "--seed", "-1"],
+            ["invalid value '-1' for '--seed", "invalid digit"],
+        ),
     ] {
         let (code, out, err) = truegrind(at, arguments);
         assert_eq!(code, 2, "{arguments:?}: {out}{err}");
         assert!(words.iter().all(|word| err.contains(word)), "{arguments:?}: {err}");
     }
     // RAPID for an arm that does not read it is written, with a note.
-    let (code, _, err) = truegrind(at, &ur5);
-    assert!(code == 0 && err.contains("reads URScript"), "{err}");
+    let plan = [
+        "plan",
+        "--robot",
+        "universal-robots-ur5",
+        "--sensor",
+        "tracker",
+        "--poses",
+        "20",
+        "-o",
+        "ur-poses.mod",
+    ];
+    for verb in [&ur5[..], &plan] {
+        let (code, _, err) = truegrind(at, verb);
+        assert!(code == 0 && err.contains("reads URScript"), "{verb:?}: {err}");
+    }
     let (_, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "abb.mod"]);
     assert!(!err.contains("translated"), "{err}");
 }

@@ -327,7 +327,7 @@ fn warnings(sheet: &DataSheet) -> Vec<String> {
     }
     if sheet.published.is_empty() {
         out.push(
-            "published: no pose stated: nothing checks the links; one pose of the data sheet will do"
+            "published: no pose stated: nothing checks the links; one pose of the data sheet is enough"
                 .to_owned(),
         );
     }

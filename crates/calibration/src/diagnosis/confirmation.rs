@@ -119,7 +119,7 @@ impl Confirmation {
         }
         if self.testable < MIN_TESTABLE_HALVES {
             out.push(format!(
-                "too weak to be detected in {} of {HALVES} halves of the rows, so repeating the search cannot confirm it",
+                "too weak to be detected in {} of the {HALVES} halves of the rows that were tried, so repeating the search cannot confirm it",
                 HALVES - self.testable
             ));
         } else if !self.is_stable() {

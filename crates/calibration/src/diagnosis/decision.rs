@@ -150,7 +150,7 @@ fn in_words(effect: CauseKind) -> Option<&'static str> {
              leaves the plane of the circle twice a turn is the bearing"
         }
         GearTwoJoints | GearTransmission => {
-            "turn each of these joints alone through its whole range in steps of a few degrees, and read at each: what returns with the angle \
+            "turn each joint in question alone through its whole range in steps of a few degrees, and read at each: what returns with the angle \
              is the gear"
         }
         Latency => "measure the same ten poses once at rest and once in motion: what changes is the clock",

@@ -117,7 +117,7 @@ impl VerdictBuilder {
         if !self.limits_stated {
             self.note(Reason::new(
                 ReasonKind::NoLimits,
-                "held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)",
+                "held-out error not judged: no limits were stated (--limit-rmse, --limit-max)",
             ));
         }
     }

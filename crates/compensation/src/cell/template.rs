@@ -230,7 +230,7 @@ impl Writer {
                 let Frame { position_mm: p, quaternion: q } = Frame::from_pose(&commanded);
                 self.line(
                     &format!(
-                        "# the program has it at [{}, {}, {}] mm, turned by [{}, {}, {}, {}]",
+                        "# the program has it at [{}, {}, {}] mm, quaternion [{}, {}, {}, {}]",
                         short(p[0], 3),
                         short(p[1], 3),
                         short(p[2], 3),

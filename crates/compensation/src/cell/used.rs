@@ -27,7 +27,9 @@ impl Used {
         let index =
             |list: &[CellFrame], found: &CellFrame| list.iter().position(|one| std::ptr::eq(one, found));
         let mut out = Self::default();
-        for tool in listing.tools.iter().chain(&listing.declared_tools) {
+        // Among the declared tools of NC programs are those of the cell file itself, which thereby are not used.
+        let declared = listing.declared_tools.iter().filter(|tool| tool.place.is_some());
+        for tool in listing.tools.iter().chain(declared) {
             out.tool.extend(stated.tools(tool).iter().filter_map(|found| index(&cell.tool, found)));
         }
         for object in &listing.work_objects {

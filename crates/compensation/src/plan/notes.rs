@@ -81,11 +81,13 @@ fn unstated_notes(listing: &Listing) -> Vec<String> {
 }
 
 /// What the measurement of the arm deviates from its model beyond the noise: where a σ is mostly that, how it is counted; in a model of an
-/// earlier version, where it is more than every σ of the program.
+/// earlier version, where it is more than every σ of the program; where the noise is unknown, that it is not counted.
 pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item = f64>) -> Option<String> {
     let largest = sigmas_mm.reduce(f64::max)?;
     let knowledge = arms.knowledge?;
-    let beyond = knowledge.beyond_noise_mm?;
+    let Some(beyond) = knowledge.beyond_noise_mm else {
+        return noise_unknown_note(knowledge, largest);
+    };
     // Beside doubtful effects it is known from these alone, and they are in every σ (`doubtful_effects_note`).
     if knowledge.beyond_noise_rad.is_none() && knowledge.model.effects.iter().any(Effect::is_zero) {
         return None;
@@ -107,6 +109,18 @@ pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item =
         format!(
             "the measurement deviates from this model by {beyond:.3} mm RMS more than noise explains: programs may be off by as much beyond every σ \
              stated here; `truegrind diagnose` looks for the causes"
+        )
+    })
+}
+
+/// Where no poses were repeated all that the measurement deviates from the model may be noise, or all of it the arm's: no σ counts it.
+fn noise_unknown_note(knowledge: &Estimated, largest_sigma_mm: f64) -> Option<String> {
+    let left_mm = knowledge.calibrated.held_out.rmse;
+    (left_mm > BEYOND_SIGMA * largest_sigma_mm).then(|| {
+        format!(
+            "no σ stated here counts what this model may lack: it leaves a held-out error of {left_mm:.3} mm RMSE, and too few poses were repeated to \
+             tell how much of that is the arm's and how much noise. Programs may be off by as much; a measurement with repeated poses \
+             (`truegrind plan`) tells"
         )
     })
 }

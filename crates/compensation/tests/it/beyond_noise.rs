@@ -184,3 +184,22 @@ fn what_uncertain_causes_explain_is_not_beyond_every_sigma() {
     assert!(notes(&known).contains("included in every σ but not corrected"), "{}", notes(&known));
     assert!(!notes(&known).contains("beyond every σ"), "{}", notes(&known));
 }
+
+/// Without repeated poses nobody knows what the model lacks: a σ that is far smaller than the held-out error must not stand without a word.
+#[test]
+fn a_sigma_far_below_the_held_out_error_is_not_left_without_a_word() {
+    let (source, joints) = blade();
+    let mut known = estimated(perturbed(4, 1.0), &joints);
+    known.covariance *= 0.0;
+    let notes = |known: &Estimated| planned(&source, known, Placement::Shape).notes.join("; ");
+    assert!(!notes(&known).contains("repeated poses"), "{}", notes(&known));
+    known.calibrated.held_out.rmse = 0.089;
+    assert!(
+        notes(&known).contains("held-out error of 0.089 mm RMSE, and too few poses were repeated"),
+        "{}",
+        notes(&known)
+    );
+    // Repeated poses that explain the rest.
+    known.beyond_noise_mm = Some(0.0);
+    assert!(!notes(&known).contains("repeated poses"), "{}", notes(&known));
+}

@@ -26,8 +26,8 @@ fn hsr() {
     let data = data_set("HSR-RobotCali.xlsx", None);
     assert_eq!((data.rows.len(), data.sensor), (2017, Sensor::Cable));
     assert_eq!(data.angle_step_rad, Some(0.001f64.to_radians()));
-    assert!(data.notes.iter().any(|n| n == "1 blank row(s) skipped"), "{:?}", data.notes);
-    assert!(data.notes.iter().any(|n| n == "2 column(s) without a header skipped"), "{:?}", data.notes);
+    assert!(data.notes.iter().any(|n| n == "1 blank row skipped"), "{:?}", data.notes);
+    assert!(data.notes.iter().any(|n| n == "2 columns without a header skipped"), "{:?}", data.notes);
 }
 
 #[test]

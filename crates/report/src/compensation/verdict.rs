@@ -156,12 +156,15 @@ fn left_cycles_reason(listing: &Listing) -> Option<String> {
 
 fn at_risk_reason(plan: &Plan) -> Option<String> {
     let (at_risk, cuts) = placement::left_at_risk(plan);
-    (at_risk > 0).then(|| {
-        format!(
-            "{at_risk} of {cuts} cuts are not corrected, since that would make them worse with a probability above --max-risk. Measure more \
-             poses near them (`truegrind plan`)"
-        )
-    })
+    let are_not = match (at_risk, cuts) {
+        (0, _) => return None,
+        (_, 1) => "the only cut is not corrected, since that would make it".to_owned(),
+        (1, _) => format!("1 of {cuts} cuts is not corrected, since that would make it"),
+        _ => format!("{at_risk} of {cuts} cuts are not corrected, since that would make them"),
+    };
+    Some(format!(
+        "{are_not} worse with a probability above --max-risk. Measure more poses near the path (`truegrind plan`)"
+    ))
 }
 
 /// Motions that are kept for the sake of others of their cut.

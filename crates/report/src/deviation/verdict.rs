@@ -83,18 +83,18 @@ fn uncertain_points(reports: &[&PathReport]) -> Vec<Reason> {
 fn of_path(report: &PathReport, before: f64, after: f64, all_worse: bool) -> Option<Reason> {
     if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape(report) {
         let words = format!(
-            "{} corrects the shape of the path ({before:.3} → {after:.3} mm RMS after the best rigid registration) but not its placement: as it \
-             lies, it deviates by {place_mm:.3} mm RMS (see `compensate --placement`)",
+            "{}: the shape of the path is corrected ({before:.3} → {after:.3} mm RMS after the best rigid registration) but not its placement: \
+             with it, the path deviates by {place_mm:.3} mm RMS (see `compensate --placement`)",
             report.model
         );
         return Some((Status::Good, words));
     }
     if let Some(words) = worse(report, before, after) {
         let status = if all_worse { Status::Bad } else { Status::Warning };
-        return Some((status, format!("{} {words}", report.model)));
+        return Some((status, format!("{}: the correction {words}", report.model)));
     }
     let [before, after] = bent(report)?;
-    Some((Status::Warning, format!("{} {}", report.model, bent_words(before, after))))
+    Some((Status::Warning, format!("{}: the correction {}", report.model, bent_words(before, after))))
 }
 
 /// Whether the model corrects a cut, and knows the arm well enough for that.
@@ -103,7 +103,7 @@ fn of_certainty(report: &PathReport, risk: Risk) -> Option<Reason> {
     if report.cut().all(|point| point.status == MotionStatus::Left) {
         let because = report.cut().find_map(|point| point.reason.as_ref());
         let because = because.map_or_else(String::new, |reason| format!(": {reason}"));
-        return Some((Status::Warning, format!("{} corrects no cut{because}", report.model)));
+        return Some((Status::Warning, format!("{}: no cut is corrected{because}", report.model)));
     }
     let (sigma, rms) = (report.sigma_rms_mm()?, rms(report, BEFORE)?);
     (risk == Risk::Unstated && sigma > rms && only_shape(report).is_none()).then(|| {
@@ -209,7 +209,7 @@ fn between_targets(report: &PathReport) -> Vec<Reason> {
 fn turns(report: &PathReport) -> Option<Reason> {
     let [before, after] = [BEFORE, AFTER].map(|side| report.largest_turn_rad(side).map(f64::to_degrees));
     let words = format!(
-        "{}: the tool is turned off its intended orientation by up to {:.3}° before, {:.3}° after",
+        "{}: the orientation of the tool deviates by up to {:.3}° before, {:.3}° after",
         report.model, before?, after?
     );
     Some((Status::Good, words))
@@ -315,7 +315,7 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape(report) =>
         {
             format!(
-                "Shape of the path {before:.3} mm RMS before, {after:.3} mm after ({}); its placement is not corrected, {place_mm:.3} mm RMS as it lies{}",
+                "Shape of the path {before:.3} mm RMS before, {after:.3} mm after ({}); its placement is not corrected, with it {place_mm:.3} mm RMS{}",
                 meaning(report.after),
                 of_model(report),
             )
@@ -364,18 +364,28 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             of_model(report),
         ),
         [(first, ..), ..] => {
+            // Where every model corrects the shape alone, the path as a whole stays where it was.
+            let shapes: Option<Vec<[f64; 2]>> =
+                judged.iter().map(|(report, ..)| Some(only_shape(report)?.shape_mm)).collect();
+            let (what, stays) = match shapes {
+                Some(_) => ("Shape of the path (RMS)".to_owned(), "; its placement is not corrected"),
+                None => (format!("Largest deviation{}", along_normal(first)), ""),
+            };
+            let sizes: Vec<[f64; 2]> =
+                shapes.unwrap_or_else(|| judged.iter().map(|(_, before, after)| [*before, *after]).collect());
             let of = |pick: fn(&f64, &f64) -> std::cmp::Ordering| {
-                judged.iter().map(|(report, _, after)| (after, report)).min_by(|a, b| pick(a.0, b.0))
+                let after =
+                    sizes.iter().map(|[_, after]| after).zip(judged.iter().map(|(report, ..)| report));
+                after.min_by(|a, b| pick(a.0, b.0))
             };
             let decimals = decimals(first.after);
             let under = |found: Option<(&f64, &&PathReport)>| match found {
                 Some((after, report)) => format!("{after:.decimals$} mm under {}", report.model),
                 None => known(None),
             };
-            let before = judged.iter().map(|(_, before, _)| *before).fold(0.0, f64::max);
+            let before = sizes.iter().map(|[before, _]| *before).fold(0.0, f64::max);
             format!(
-                "Largest deviation{} {before:.3} mm before; after: best {}, worst {} ({})",
-                along_normal(first),
+                "{what} {before:.3} mm before; after: best {}, worst {} ({}){stays}",
                 under(of(|a, b| a.total_cmp(b))),
                 under(of(|a, b| b.total_cmp(a))),
                 meaning(first.after),

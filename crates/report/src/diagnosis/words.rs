@@ -11,18 +11,19 @@ pub(super) fn located(effect: CauseKind, joints: Option<&[usize]>, rows: Option<
     // "gear two joints of joints 2 and 3" says it twice, and so does "link bending of link 2".
     let name = words.strip_suffix(" two joints").or(words.strip_prefix("link ")).unwrap_or(&words);
     let place_of = |joints, rows| place_of(effect, joints, rows);
-    match (joints, rows) {
-        (_, Some(_)) => format!("{name} in {}", place_of(joints, rows)),
-        (Some([_, ..]), _) => format!("{name} of {}", place_of(joints, rows)),
-        _ => name.to_owned(),
-    }
+    let of = match joints {
+        Some([_, ..]) => format!(" of {}", place_of(joints, None)),
+        _ => String::new(),
+    };
+    let within = rows.map_or_else(String::new, |rows| format!(" in {}", place_of(None, Some(rows))));
+    format!("{name}{of}{within}")
 }
 
 /// A cause that cannot be told apart from others, with its share.
 pub(super) fn member(member: &Member) -> String {
     let share =
         if member.share < 0.01 { "below 1".to_owned() } else { format!("{:.0}", 100.0 * member.share) };
-    format!("{} {share} %", located(member.effect, member.joints.as_deref(), member.rows))
+    format!("{} ({share} %)", located(member.effect, member.joints.as_deref(), member.rows))
 }
 
 /// The families of the members of a finding: the only one, or each with its share, largest first; none of less than a hundredth.
@@ -64,11 +65,16 @@ pub(crate) fn place(finding: &Finding) -> String {
 /// Links, joints or rows, for a cell.
 pub(super) fn place_of(effect: CauseKind, joints: Option<&[usize]>, rows: Option<[usize; 2]>) -> String {
     let part = if effect == CauseKind::LinkBending { "link" } else { "joint" };
-    match (joints, rows) {
-        (_, Some([from, to])) => format!("rows {from} to {to}"),
-        (Some([one]), _) => format!("{part} {one}"),
-        (Some(several), _) if !several.is_empty() => format!("{part}s {}", sentence::listed(several)),
-        _ => "all rows".to_owned(),
+    let at = match joints {
+        Some([one]) => Some(format!("{part} {one}")),
+        Some(several @ [_, ..]) => Some(format!("{part}s {}", sentence::listed(several))),
+        _ => None,
+    };
+    let within = rows.map(|[from, to]| format!("rows {from} to {to}"));
+    match (at, within) {
+        (Some(at), Some(within)) => format!("{at}, {within}"),
+        (Some(one), None) | (None, Some(one)) => one,
+        (None, None) => "all rows".to_owned(),
     }
 }
 

@@ -499,10 +499,16 @@ fn a_corrected_shape_at_an_uncorrected_place_is_no_failure() {
     });
     let moved = report("arm", points.collect());
     let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(&moved)), 100);
-    for words in ["Shape of the path", "its placement is not corrected, 2.750 mm RMS as it lies"] {
+    for words in ["Shape of the path", "its placement is not corrected, with it 2.750 mm RMS"] {
         assert!(page.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{words}: {page}");
     }
     assert!(!page.contains("worse"), "{page}");
+    // Under two models too, where the largest deviation is farther off than before.
+    let two = [moved.clone(), PathReport { model: "other".to_owned(), ..moved.clone() }];
+    let page = terminal::document(&view::summary("blade.mod", &two), 100);
+    let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(page.contains("Shape of the path (RMS) 0.") && !page.contains("Largest deviation"), "{page}");
+    assert!(page.contains("arm: the shape of the path is corrected"), "{page}");
     // A path that is bent more than before is.
     let worse = (0..4).map(|k| point(k, at(k), Some(place), Some(bent(k).map(|v| 1.2 * v)), false));
     let bent_more = report("arm", worse.collect());
@@ -555,7 +561,7 @@ fn a_path_that_is_corrected_in_part_is_judged_as_a_whole() {
     let text = page(&path(|_| true));
     assert!(text.contains("[ok]") && !text.contains("steps"), "{text}");
     let text = page(&path(|_| false));
-    assert!(text.contains("[warning]") && text.contains("corrects no cut"), "{text}");
+    assert!(text.contains("[warning]") && text.contains("no cut is corrected"), "{text}");
 }
 
 /// Figures of a program that is not the intended one with corrected targets are not its figures.

@@ -84,6 +84,26 @@ fn an_ambiguous_finding_is_titled_by_its_likeliest_member() {
     assert!(page.contains("1. Gear transmission, joint 1"), "{page}");
 }
 
+/// Two joints whose zero moved in the same rows are two causes.
+#[test]
+fn a_cause_with_rows_names_its_joint() {
+    let (found, dataset) = diagnosed();
+    let mut found = found.clone();
+    let finding = &mut found.diagnosis.findings[0];
+    finding.confidence = Confidence::Ambiguous;
+    finding.members = serde_json::from_value(serde_json::json!([
+        {"effect": "joint-zero-shift", "joints": [3], "rows": [0, 20], "family": "drive", "share": 0.6},
+        {"effect": "joint-zero-shift", "joints": [5], "rows": [0, 20], "family": "drive", "share": 0.4},
+    ]))
+    .unwrap();
+    let text = on_a_terminal(&view::summary(&found)).split_whitespace().collect::<Vec<_>>().join(" ");
+    for words in ["joint zero shift of joint 3 in rows", "joint zero shift of joint 5 in rows"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let page = on_a_terminal(&view::document(&found, dataset));
+    assert!(page.contains("1. Joint zero shift, joint 3, rows"), "{page}");
+}
+
 /// The terminal says why a cause is not certain, its nearest rival, and that programs are not corrected for it.
 #[test]
 fn a_doubt_is_told_with_the_nearest_rival_and_what_becomes_of_programs() {

@@ -15,6 +15,7 @@ use crate::measurement::dataset::{Dataset, Extra, PathPoint, Reading, Row, Senso
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
+use truegrind_math::sentence;
 use truegrind_math::work::checkpoint;
 
 /// Largest difference of a quaternion's norm from 1: four decimals still pass.
@@ -81,12 +82,19 @@ pub(super) fn dataset(
     let width = reader.header.cells.len().max(table.width);
     let nameless = (width - headed).max(unnamed) + table.blank_columns;
     let counted = [
-        (nameless, "column(s) without a header skipped"),
-        (blank, "blank row(s) skipped"),
-        (as_text, "number(s) stored as text were read as numbers"),
+        (nameless, "column without a header skipped", "columns without a header skipped"),
+        (blank, "blank row skipped", "blank rows skipped"),
+        (
+            as_text,
+            "number stored as text was read as a number",
+            "numbers stored as text were read as numbers",
+        ),
     ];
     notes.extend(
-        counted.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")),
+        counted
+            .iter()
+            .filter(|(count, ..)| *count > 0)
+            .map(|(count, one, several)| sentence::counted(*count, one, several)),
     );
     if columns.anchor.is_some() {
         notes.extend(number_anchors(&mut rows));

@@ -7,7 +7,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum RecipeError {
     /// Not TOML, or a key that is missing, misspelt or of the wrong type.
-    #[error("{file}: line {line}: {message}")]
+    #[error("{file}: not a recipe: line {line}: {message}; docs/simulate.md has a complete one")]
     Syntax {
         /// File.
         file: String,

@@ -86,7 +86,7 @@ fn columns_in_any_order_with_others_between() {
     assert_eq!(row.other(), ["Ann"]);
     assert_eq!((data.rows[1].condition.time_h, data.rows[1].session()), (None, None));
     assert!(data.notes.iter().any(|n| n.contains("`operator`")));
-    assert!(data.notes.iter().any(|n| n == "1 blank row(s) skipped"));
+    assert!(data.notes.iter().any(|n| n == "1 blank row skipped"));
     assert_eq!(data.sha256.len(), 64);
 }
 

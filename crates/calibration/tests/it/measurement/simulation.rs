@@ -188,7 +188,7 @@ fn grids_lists_and_views() {
 fn recipes_that_cannot_be_meant_are_refused() {
     let cases = [
         (random(5, CABLE).replace("irb-120", "irb-12"), "robot: unknown robot"),
-        (random(5, &format!("colour = 3\n{CABLE}")), "recipe.toml: line 3"),
+        (random(5, &format!("colour = 3\n{CABLE}")), "recipe.toml: not a recipe: line 3"),
         (
             random(5, &format!("{CABLE}[noise]\nstudent_t = 1.5\n")),
             "noise.student_t: found 1.5, expected more than 2",

@@ -157,8 +157,8 @@ fn a_title_above_blank_rows_below_and_columns_without_a_header() {
     let rows = vec![vec![Text("IRB 120, hall 3")], vec![], header(), row(500.0), vec![Blank; 7], blank_below];
     let data = read(&workbook(&[("Sheet1", 3, rows)]), None).unwrap();
     assert_eq!(data.rows.iter().map(|r| (r.number, r.line)).collect::<Vec<_>>(), [(6, 6), (8, 8)]);
-    assert!(data.notes.iter().any(|n| n == "2 column(s) without a header skipped"), "{:?}", data.notes);
-    assert!(data.notes.iter().any(|n| n == "1 blank row(s) skipped"), "{:?}", data.notes);
+    assert!(data.notes.iter().any(|n| n == "2 columns without a header skipped"), "{:?}", data.notes);
+    assert!(data.notes.iter().any(|n| n == "1 blank row skipped"), "{:?}", data.notes);
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn numbers_stored_as_text_are_numbers_and_other_text_is_not() {
     texts[6] = Text(" 512.75 ");
     let data = read(&workbook(&[("Sheet1", 1, vec![header(), texts.clone()])]), None).unwrap();
     assert_eq!(data.rows[0].reading, Reading::Cable(512.75));
-    assert!(data.notes.iter().any(|n| n.starts_with("1 number(s) stored as text")), "{:?}", data.notes);
+    assert!(data.notes.iter().any(|n| n.starts_with("1 number stored as text")), "{:?}", data.notes);
     for (cell, found) in
         [(Text("512,75"), "`512,75`"), (Text("#DIV/0!"), "`#DIV/0!`"), (Blank, "an empty cell")]
     {
