@@ -87,6 +87,11 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
             "Corrected for a mass far above what the robot is rated for: check it before running the program",
         ),
         (
+            plan.other_loads > 0,
+            "Corrected, but the program carries another load than the measurement did, and the deflection of this arm is known for that one alone: \
+             measure the arm with the load of the program, or check these motions before running it",
+        ),
+        (
             paths(plan, listing)[2] > 0,
             "Corrected, except for some lines or arcs, where the workpiece deviates as before",
         ),

@@ -296,6 +296,9 @@ fn verdict_and_page_tell_what_to_look_at() {
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
         assert!(text.contains(sentence), "{text}");
     }
+    let other = Plan { other_loads: 1, ..plan.clone() };
+    let text = terminal::document(&view::summary(&other, &listing, &files), 200);
+    assert!(text.contains("[warning] Corrected, but the program carries another load"), "{text}");
     let heavy = Plan { is_overloaded: true, ..plan.clone() };
     let text = terminal::document(&view::summary(&heavy, &listing, &files), 200);
     assert!(text.contains("[warning] Corrected for a mass far above what the robot is rated for"), "{text}");
