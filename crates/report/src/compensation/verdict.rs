@@ -69,6 +69,10 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
              running the program",
         ),
         (
+            !listing.nc.unstated_turns.is_empty(),
+            "Corrected as if the turn about the tool vector were 0, but no word states it: state it, or A, B and C, before running the program",
+        ),
+        (
             depends_on_call(plan, listing),
             "Corrected, but a call of another program may change the modal state, and each NC program is read by itself: state it again after the \
              call, or check the motions there",
@@ -83,13 +87,13 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
              program",
         ),
         (
-            plan.is_overloaded,
-            "Corrected for a mass far above what the robot is rated for: check it before running the program",
-        ),
-        (
             plan.other_loads > 0,
             "Corrected, but the program carries another load than the measurement did, and the deflection of this arm is known for that one alone: \
              measure the arm with the load of the program, or check these motions before running it",
+        ),
+        (
+            plan.is_overloaded,
+            "Corrected for a mass far above what the robot is rated for: check it before running the program",
         ),
         (
             paths(plan, listing)[2] > 0,
