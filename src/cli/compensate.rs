@@ -191,7 +191,11 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
     }
     note_unused_entries([&done.used], &context.cell, context.surface.as_ref());
     if done.row.ended == Ended::Already {
-        print_result(format!("{}: already compensated with this model; nothing written\n", done.row.file))?;
+        print_result(format!(
+            "{}: already compensated with this model; nothing written. Lines that were added or changed since belong into the original: compensate that \
+             one again\n",
+            done.row.file
+        ))?;
         return Ok(context.exit_criteria().exit_status(done.clean, done.changed));
     }
     if let Some(path) = &arguments.diff {
