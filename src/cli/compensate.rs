@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use serde_json::Value;
+use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::deviation::{After, PathReport, files_of};
 use truegrind::compensation::plan::Plan;
 use truegrind::compensation::risk::prepared_estimate::PreparedEstimate;
@@ -88,7 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         robot_match::note_other_language(&sheet);
     }
     let options = arguments.options(condition, jobs.len());
-    let mut setup = programs::setup(&cell, stated.or(Some(robot.as_str().into())));
+    let mut setup = cell_setup(&cell);
     let single = matches!(jobs.as_slice(), [job] if job.under.is_none() || job.paths.len() > 1);
     let exits_after = single && !arguments.shares.on();
     let shared = read_log::finish();
