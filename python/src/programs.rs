@@ -20,7 +20,7 @@ use truegrind::report::{deviation as deviations, format};
 use truegrind::{
     ActingArm, After, Cell, Circles, CompensateOptions, CompensatePlan, Compensated, Condition, Cuts, Emit,
     Estimated, Listing, Mark, MotionStatus, NcSetup, PathReport, Program, SurfaceFile, VerificationTask,
-    compensate, robots, verify,
+    compensate, verify,
 };
 
 use crate::arm::Stated;
@@ -176,11 +176,6 @@ fn read_surface(path: &Path) -> PyResult<SurfaceFile> {
     };
     let read = SurfaceFile::read(&name, &bytes, resolve);
     Ok(read.map_err(|error| Refusal::new(Kind::Program, error).of_file(&name))?)
-}
-
-/// Control settings of the robot file for NC programs; none for an unknown robot.
-fn nc_setup(cell: &Cell, robot: &str) -> NcSetup {
-    cell_setup(cell, robots::load(robot).ok().and_then(|robot| robot.sheet.orientation()))
 }
 
 /// For each file, whether it carries the mark of this model.
@@ -414,7 +409,7 @@ fn corrected(
     let Place { cell, surface } = place;
     agreed(&sources, &cell, arm)?;
     report_step(&format!("reading {}", sources.name()));
-    let setup = nc_setup(&cell, &arm.robot);
+    let setup = cell_setup(&cell);
     let mut program = sources.task(&setup);
     let loads = own_loads.then(|| program.loads());
     // The syntax trees are larger than the file and not needed once the motions are listed.
@@ -597,7 +592,7 @@ impl Run<'_> {
         let Place { cell, surface } = place;
         let arm: &Estimated = &self.estimated.arm;
         agreed(self.programs, cell, arm)?;
-        let setup = nc_setup(cell, &arm.robot);
+        let setup = cell_setup(cell);
         report_step(&format!("reading {}", self.programs.name()));
         let task = self.programs.task(&setup);
         let original = self.originals.map(|original| original.task(&setup));

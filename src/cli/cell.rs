@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::Args;
 use truegrind::compensation::cell::Cell;
+use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::cell::template::{TemplateProgram, cell_template};
 use truegrind::programs::reading::Program;
 
@@ -48,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     }
     let named = arguments.robot.as_deref().map(|name| arguments.links.of(name));
     let robot = named.map(inputs::robot).transpose()?;
-    let setup = programs::setup(&Cell::default(), named);
+    let setup = cell_setup(&Cell::default());
     let read = jobs.iter().map(|job| Programs::read(&job.paths)).collect::<anyhow::Result<Vec<_>>>()?;
     let names: Vec<String> = read.iter().map(Programs::name).collect();
     let tasks: Vec<Program<'_>> = read.iter().map(|programs| programs.task(&setup)).collect();

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::arm::condition::Condition;
-use truegrind::arm::effect::Effect;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
 use truegrind::compensation::cell::{Cell, Used};
+use truegrind::compensation::condition::other_load::is_other_load;
 use truegrind::compensation::condition::overload::{overload, rated_payload_kg, stated_overload};
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
@@ -40,9 +40,6 @@ pub(super) struct CellArguments {
     #[arg(long, value_name = "X,Y,Z", requires = "payload", allow_hyphen_values = true)]
     pub(super) payload_centre: Option<String>,
 }
-
-/// Share of the load within which another one is the same.
-const SAME_LOAD: f64 = 0.1;
 
 impl CellArguments {
     /// The loads that the program declares; `None` if `--payload` overrides them.
@@ -79,11 +76,10 @@ impl CellArguments {
     /// Refuses a payload that the model cannot follow.
     fn refuse_other_load(&self, model: Option<&Estimated>) -> anyhow::Result<()> {
         let (Some(kg), Some(model)) = (self.payload, model) else { return Ok(()) };
-        let measured_kg = model.condition.payload_kg.unwrap_or(0.0);
-        let holds = |effect: &Effect| effect.holds_for_one_load() && !effect.is_zero();
-        if (kg - measured_kg).abs() <= SAME_LOAD * measured_kg || !model.model.effects.iter().any(holds) {
+        if !is_other_load(kg, model) {
             return Ok(());
         }
+        let measured_kg = model.condition.payload_kg.unwrap_or(0.0);
         bail!(
             "--payload {kg}: the masses of {} are not known, so its deflection was identified for the load of the measurement ({measured_kg} kg) and \
              follows no other: measure with {kg} kg on the flange, or omit --payload and accept the error from the different load",

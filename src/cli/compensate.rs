@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use serde_json::Value;
+use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::deviation::{After, PathReport, files_of};
 use truegrind::compensation::plan::Plan;
 use truegrind::compensation::risk::prepared_estimate::PreparedEstimate;
@@ -88,7 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         robot_match::note_other_language(&sheet);
     }
     let options = arguments.options(condition, jobs.len());
-    let mut setup = programs::setup(&cell, stated.or(Some(robot.as_str().into())));
+    let mut setup = cell_setup(&cell);
     let single = matches!(jobs.as_slice(), [job] if job.under.is_none() || job.paths.len() > 1);
     let exits_after = single && !arguments.shares.on();
     let shared = read_log::finish();
@@ -191,7 +192,11 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
     }
     note_unused_entries([&done.used], &context.cell, context.surface.as_ref());
     if done.row.ended == Ended::Already {
-        print_result(format!("{}: already compensated with this model; nothing written\n", done.row.file))?;
+        print_result(format!(
+            "{}: already compensated with this model; nothing written. Lines that were added or changed since belong into the original: compensate that \
+             one again\n",
+            done.row.file
+        ))?;
         return Ok(context.exit_criteria().exit_status(done.clean, done.changed));
     }
     if let Some(path) = &arguments.diff {

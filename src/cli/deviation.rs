@@ -10,6 +10,7 @@ use truegrind::arm::arm_file::ArmFile;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
+use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::cell::{Cell, Used};
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
@@ -25,7 +26,7 @@ use super::cell_arguments::{CellArguments, note_unused_entries, refuse_contradic
 use super::computation::{Common, on_threads};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch, read_log};
-use super::inputs::{self, NamedModel, NamedRobot, StatedRobot};
+use super::inputs::{self, NamedModel, StatedRobot};
 use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
 use super::robot_match;
@@ -166,8 +167,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let runners = runners(arguments)?;
     let first = runners.first().ok_or_else(|| anyhow!("--model names no arm"))?;
     let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;
-    let robot = arguments.robot.named().or(first.robot.as_deref().map(NamedRobot::from));
-    let setup = programs::setup(&cell, robot);
+    let setup = cell_setup(&cell);
     let context = DeviationContext {
         runners: &runners,
         originals: originals.as_ref(),
@@ -224,7 +224,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
 #[cfg(feature = "visual")]
 impl Runner {
     /// The arms of a recording.
-    fn drawn<'a>(&'a self, robot: Option<NamedRobot<'a>>) -> super::recording::Arms<'a> {
+    fn drawn<'a>(&'a self, robot: Option<inputs::NamedRobot<'a>>) -> super::recording::Arms<'a> {
         let is = if self.after == After::Achieved { "simulated actual arm" } else { "estimated arm" };
         super::recording::Arms { real: &self.model, is, nominal: &self.nominal, robot }
     }

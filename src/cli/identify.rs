@@ -397,6 +397,14 @@ fn note_payloads(dataset: &mut Dataset, robot: &Robot) {
             robot.sheet.name
         ));
     }
+    let is_at_flange = dataset.rows.iter().all(|row| row.condition.payload_centre_mm == [0.0; 3]);
+    if robot.model.bodies.is_some() && is_at_flange && most_kg.is_some_and(|kg| kg > 0.0) {
+        dataset.notes.push(
+            "column payload: its centre of mass is taken to be at the flange; where it is not, state it in the columns payload_x, payload_y and \
+             payload_z (mm, in the flange frame), or the compliance of the wrist is found too large"
+                .to_owned(),
+        );
+    }
     if let (Some(kg), Some(rated)) = (most_kg, robot.sheet.payload_kg)
         && kg > OVERLOAD * rated
     {

@@ -6,8 +6,6 @@ use std::path::{Component, Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use rayon::prelude::*;
-use truegrind::compensation;
-use truegrind::compensation::cell::Cell;
 use truegrind::programs::nc::called::called_programs;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::rapid::task_list;
@@ -16,7 +14,6 @@ use truegrind::units::key::sha256;
 use truegrind::units::run::Unit;
 
 use super::files;
-use super::inputs::{self, NamedRobot};
 use super::terminal::print_message;
 
 /// The files of one task, read and rewritten together.
@@ -419,12 +416,4 @@ pub(super) fn called(jobs: &[Job]) -> BTreeSet<String> {
     }
     let calls = |path: &&PathBuf| called_programs(&files::read(path).unwrap_or_default());
     paths.par_iter().flat_map_iter(calls).collect()
-}
-
-/// Control settings that NC programs do not contain, from the cell file and the robot file. `robot`: catalogue name or file;
-/// an unknown one is ignored.
-pub(super) fn setup(cell: &Cell, robot: Option<NamedRobot<'_>>) -> Setup {
-    let orientation =
-        robot.and_then(|named| inputs::robot(named).ok()).and_then(|robot| robot.sheet.orientation());
-    compensation::cell::nc_setup::cell_setup(cell, orientation)
 }

@@ -13,6 +13,7 @@ use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::solver::SOLVERS;
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::compensation::cell::Used;
+use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::deviation::{After, Deviation, MotionStatus, PathPoint, PathReport};
 use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind::math::se3::Pose;
@@ -31,7 +32,7 @@ use super::programs::Programs;
 use super::progress::Spinner;
 use super::recording::{Arms, meshes, recording};
 use super::robot_match;
-use super::{identify, inputs, programs};
+use super::{identify, inputs};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
@@ -298,7 +299,7 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
         }
     };
     let robot = arguments.robot.named().or(knowledge.map(|k| k.robot.as_str().into()));
-    let task = programs.task(&programs::setup(&cell, robot));
+    let task = programs.task(&cell_setup(&cell));
     refuse_contradictions(task.listing(), &cell, surface.as_ref(), &nominal)?;
     if let Some(robot) = robot {
         let name = inputs::robot(robot).map_or_else(|_| robot.name.to_owned(), |robot| robot.sheet.name);

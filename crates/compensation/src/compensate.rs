@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 use crate::cell::Cell;
+use crate::condition::other_load::other_loads;
 use crate::condition::overload::{is_far_above_rating, stated_overload};
 use crate::cut::{Cuts, may_cut};
 use crate::deviation::MotionStatus;
@@ -194,6 +195,7 @@ fn agreed(
     let most_kg =
         stated.as_ref().map(|stated| stated.most_kg).into_iter().chain(options.condition.payload_kg);
     planned.is_overloaded = most_kg.into_iter().any(|kg| is_far_above_rating(kg, &arm.robot));
+    planned.other_loads = other_loads(program.listing(), arm, options, &planned.outcomes);
     planned.notes.extend(stated.map(|stated| stated.note));
     if program.language() == Language::Rapid
         && let Some(off) = single_precision(&planned.changes)

@@ -7,6 +7,7 @@ pub(crate) mod joint_limits;
 pub(crate) mod half_turns;
 pub(crate) mod joint_jump;
 pub(crate) mod joint_lines;
+pub mod measured_turns;
 pub(crate) mod path_check;
 pub(crate) mod segment_checker;
 pub(crate) mod unchanged;

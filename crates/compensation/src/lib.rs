@@ -27,7 +27,7 @@ mod configuration;
 pub mod cut;
 pub mod line_list;
 pub mod deviation;
-mod feasibility;
+pub mod feasibility;
 pub mod frames;
 pub mod options;
 pub mod plan;

@@ -79,6 +79,8 @@ pub struct Plan {
     pub unstated_axes: Vec<char>,
     /// How many corrected motions have a load that is known only at run time, under a model whose deflection follows the load.
     pub unknown_loads: usize,
+    /// How many corrected motions carry another load than that of the measurement, under a deflection that holds for that one alone.
+    pub other_loads: usize,
     /// Whether program or job state a mass far above what the robot is rated for: the model was not measured under it.
     pub is_overloaded: bool,
     /// Steps between corrected motions and neighbours that are left; known once the program is rewritten.

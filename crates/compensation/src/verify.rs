@@ -22,6 +22,7 @@ use crate::cell::Cell;
 use crate::deviation::{
     After, Deviation, MissingMotions, MotionStatus, ON_SURFACE_MM, PathPoint, PathReport, files_of,
 };
+use crate::feasibility::measured_turns::outside_along;
 use crate::frames::frame_table::FrameTable;
 use crate::plan::reason::OutcomeReason;
 use crate::risk::fixtures::{self, part_of_motion};
@@ -29,6 +30,7 @@ use crate::segment::condition_schedule::ConditionSchedule;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::region::NearestSample;
 use truegrind_math::se3::Pose;
 use truegrind_math::work::checkpoint;
 use truegrind_programs::motion::load::Loads;
@@ -203,7 +205,7 @@ fn path_point(
             known.hypot(arms.conditions.play_uncertainty_mm(condition_index, &joints, tool))
         }),
         shape_sigma_mm: None,
-        outside: acting_arm.knowledge.and_then(|k| k.region.outside(&joints)),
+        outside: acting_arm.knowledge.and_then(|k| outside_along(k, &joints, &mut NearestSample::default())),
         status: if second.is_some() && !same { MotionStatus::Changed } else { MotionStatus::Left },
         reason: same.then(|| "same as in the original".to_owned()),
     }

@@ -534,6 +534,8 @@ pub struct NcFacts {
     pub open_controls: Vec<Place>,
     /// The first motion with a tool of some length in each LinuxCNC file, if nothing takes the length over (G43): T and M6 alone do not.
     pub unstated_lengths: Vec<Place>,
+    /// The first readable motion under a tool vector in each file that states no turn about it (THETA).
+    pub unstated_turns: Vec<Place>,
     /// Letters of the axes that NC blocks name beside X, Y, Z, A, B and C, and the first of each.
     pub other_axes: BTreeMap<char, Place>,
     /// Motions that call a program outside their file (NC).

@@ -236,3 +236,22 @@ fn a_program_that_another_of_the_run_calls_is_no_main_program() {
     assert!(corrected("alone", false));
     assert!(!corrected("called", true));
 }
+
+/// The convention of the arm's own language was taken for that of the control. It overruled the comment, and stood in where none was: "ok", with
+/// the path of a UR10 off by 5.6 mm instead of 3.1.
+#[test]
+fn the_language_of_the_arm_says_nothing_of_a_b_and_c() {
+    let dir = folder();
+    let at = dir.path();
+    let text = "G90 G71 G17\nT1 D1 M6\nG54\nTRAORI\nG0 X0 Y0 Z0 A10 B20 C30\nG1 X9 F600\nM30\n";
+    fs::write(at.join("part.mpf"), text).unwrap();
+    fs::write(at.join("stated.mpf"), format!("; truegrind angles rxyz\n{text}")).unwrap();
+    for robot in ["abb-irb-120", "kuka-kr10-r1420", "universal-robots-ur10", "fanuc-m-20ia"] {
+        for (program, asked) in [("part.mpf", true), ("stated.mpf", false)] {
+            let cell = format!("{robot}-{program}.toml");
+            let (_, _, err) = truegrind(at, &["cell", program, "-o", &cell, "--robot", robot]);
+            let written = fs::read_to_string(at.join(&cell)).unwrap();
+            assert_eq!(written.contains("angles = "), asked, "{robot} {program}: {err}{written}");
+        }
+    }
+}

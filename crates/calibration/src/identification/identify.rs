@@ -631,6 +631,12 @@ pub(crate) fn median_condition(dataset: &Dataset) -> Condition {
         time_h: median_of(|c| c.time_h),
         temperature_c: median_of(|c| c.temperature_c),
         payload_kg: median_of(|c| c.payload_kg),
+        payload_centre_mm: std::array::from_fn(|axis| {
+            let loaded =
+                dataset.rows.iter().filter(|row| row.condition.payload_kg.is_some_and(|kg| kg > 0.0));
+            let centres: Vec<f64> = loaded.map(|row| row.condition.payload_centre_mm[axis]).collect();
+            median(&centres).unwrap_or(0.0)
+        }),
         ..Condition::default()
     }
 }

@@ -344,8 +344,7 @@ pub struct Cell {
     /// The robot of the programs, by its name in the catalogue or in its robot file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
-    /// Convention of A, B and C in NC programs, by its word ([`Angles`]); takes precedence over robot file and comments of
-    /// the programs.
+    /// Convention of A, B and C in NC programs, by its word ([`Angles`]); takes precedence over comments of the programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles: Option<String>,
     /// The control that runs NC programs: one of [`Dialect::WORDS`].

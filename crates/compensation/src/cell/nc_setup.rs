@@ -1,4 +1,4 @@
-//! What cell file and robot file state that NC programs do not: control, angle convention, tools and work offsets.
+//! What the cell file states that NC programs do not: control, angle convention, tools and work offsets.
 
 use std::collections::BTreeSet;
 
@@ -8,14 +8,15 @@ use truegrind_programs::motion::Frame;
 use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup::Setup;
 
-/// How programs are read for a cell; `orientation`: the robot's way to write orientations, where its file states it.
-pub fn cell_setup(cell: &Cell, orientation: Option<Orientation>) -> Setup {
+/// How programs are read for a cell. How the arm's own language writes orientations does not count: NC programs are written for
+/// the control that drives the arm, which may use another convention.
+pub fn cell_setup(cell: &Cell) -> Setup {
     let frames = |list: &[CellFrame]| -> Vec<(String, Frame)> {
         list.iter().filter_map(|frame| Some((frame.name.clone(), Frame::from_pose(&frame.pose()?)))).collect()
     };
     Setup {
         dialect: cell.control(),
-        angles: cell.angles().or_else(|| orientation.and_then(angle_convention)),
+        angles: cell.angles(),
         tools: frames(&cell.tool),
         frames: frames(&cell.wobj),
         called: BTreeSet::new(),

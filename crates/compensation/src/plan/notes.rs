@@ -206,6 +206,7 @@ pub(crate) fn unchecked_notes(
     out.extend(position_decisions_note(listing));
     out.extend(open_control_note(listing));
     out.extend(unstated_length_note(listing));
+    out.extend(unstated_turn_note(listing));
     let curve = |m: &u32| {
         let motion = &listing.motions[*m as usize];
         motion.own_reason.is_none()
@@ -255,6 +256,15 @@ fn unstated_length_note(listing: &Listing) -> Option<String> {
     Some(format!(
         "no G43: on LinuxCNC, T and M6 do not activate the tool length, so X Y Z are the tool tip only if G43 is still active from before. Program \
          G43 after M6, or G49 where X Y Z are not those of the tip (before {lines})"
+    ))
+}
+
+/// NC files that state a tool vector, and nowhere the turn about it.
+fn unstated_turn_note(listing: &Listing) -> Option<String> {
+    let lines = numbered(&listing.files, listing.nc.unstated_turns.iter().copied())?;
+    Some(format!(
+        "no word states the turn about the tool vector, on which the joints of a six-axis arm depend. It was taken as 0: x of the tool lies in the \
+         plane of its axis and x of the work object. State it (THETA on an 840D), or A, B and C in place of the vector (from {lines})"
     ))
 }
 

@@ -19,6 +19,7 @@ use crate::configuration::monitored;
 use crate::deviation::Deviation;
 use crate::feasibility::correction_bounds::forbidden;
 use crate::feasibility::joint_jump::{WrittenTarget, target_fault};
+use crate::feasibility::measured_turns::outside_along;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Circles, Options, is_rewritable};
 use crate::plan::reason::OutcomeReason;
@@ -382,7 +383,7 @@ fn solve_chunk<'t>(
             play_uncertainty_mm,
             condition_index: w.condition_index,
             guess: w.original.guess,
-            outside: arms.knowledge.and_then(|k| k.region.outside_along(&w.after, &mut near)).map(Box::new),
+            outside: arms.knowledge.and_then(|k| outside_along(k, &w.after, &mut near)).map(Box::new),
             forbidden: None,
         };
         let forbidden = forbidden(&solved, w.singularity, arms, options).or_else(|| {

@@ -9,6 +9,7 @@ mod differences;
 mod doubtful_effects;
 mod segment;
 mod circles;
+mod measured_turns;
 mod payload;
 mod placement;
 mod axis_turns;

@@ -1,7 +1,10 @@
 //! Payloads that programs state.
 
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::compensate::compensate;
+use truegrind_compensation::condition::other_load::is_other_load;
 use truegrind_compensation::condition::overload::stated_overload;
 use truegrind_compensation::condition::payload::payload_at;
 use truegrind_compensation::options::Options;
@@ -157,4 +160,23 @@ fn a_mass_far_above_the_rating_is_a_warning() {
     // The tool weighs 2 kg.
     assert_eq!([1.0, 2.0, 23.0].map(|kg| is_overloaded(kg, None)), [false, false, true]);
     assert_eq!([3.0, 4.0, 25.0].map(|kg| is_overloaded(1.0, Some(kg))), [false, false, true]);
+}
+
+/// A deflection that was identified without the masses of the arm follows no load: a tool of 60 kg on an arm measured without one was "ok".
+#[test]
+fn a_load_that_the_deflection_does_not_follow_is_counted() {
+    let mut arm = super::estimated(super::perturbed(3, 1.0), &[truegrind_arm::model::Joints::zeros()]);
+    let other = |arm: &truegrind_arm::estimated::Estimated, grip: &str| {
+        let (task, loads) = grips(&format!("PROC main()\n {grip}\n m;\nENDPROC\n"));
+        let options = Options { loads: Some(loads), ..Options::default() };
+        compensate(&Program::Rapid(task), arm, &Cell::default(), &options, None).unwrap().plan.other_loads
+    };
+    assert_eq!(other(&arm, ""), 0, "a stiff arm");
+    let lump = Lump { frame: 3, axis: None, moment: None, factor: 1e-5 };
+    arm.model.effects.push(Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump: vec![lump] }));
+    // The tool weighs 2 kg.
+    assert_eq!([other(&arm, ""), other(&arm, "GripLoad part;")], [1, 1]);
+    arm.condition.payload_kg = Some(2.0);
+    assert_eq!([other(&arm, ""), other(&arm, "GripLoad part;")], [0, 1]);
+    assert!(!is_other_load(2.1, &arm) && is_other_load(0.0, &arm));
 }

@@ -81,7 +81,7 @@ reasons! {
         BeforeOmitted => "a later uncorrected block omits an axis, whose position is then that of the end of this motion",
         PositionUnknown => "the position of an axis is unknown: not programmed since the start, a reference return, or a change of frame or tool",
         OrientationUnknown => "the tool orientation is unknown: no A, B, C or tool vector with known values since the start, a call or a change of frame; state all three again",
-        UnknownConvention => "the convention of A, B and C is unknown: the robot file does not name one",
+        UnknownConvention => "the convention of A, B and C is unknown: neither the program nor the cell file states it",
         UnknownVariable => "a variable known only at run time: write its number, and the passes of a loop one after another",
         AmbiguousNumber => "a number without decimal point: mm or increments, depending on a parameter of the control",
         NoMotionCode => "no motion code (G0, G1, ...) before this block, or none since G80: the mode depends on the control",

@@ -37,7 +37,7 @@ use super::dialect::Dialect;
 use super::expression::{MAX_NUMBER, Variable, literal};
 use super::mark;
 use super::modal_group::ModalGroup;
-use super::modal_state::{ModalState, MotionMode, WordSemantics};
+use super::modal_state::{ModalState, MotionMode, OrientationMode, WordSemantics};
 use super::orientation::Angles;
 use super::parser::parse;
 use super::setup::{self, Setup, StatedFrame, Statement, flange_tool, statement};
@@ -138,7 +138,25 @@ impl<'s> Task<'s> {
         };
         task.listing.nc.open_controls = open.filter_map(first).collect();
         task.listing.nc.unstated_lengths = task.unstated_lengths();
+        task.listing.nc.unstated_turns = task.unstated_turns();
         task
+    }
+
+    /// See [`crate::motion::NcFacts::unstated_turns`].
+    fn unstated_turns(&self) -> Vec<Place> {
+        let states_none = |file: &usize| {
+            let tree = &self.trees[*file];
+            !(0..tree.len() as u32).any(|token| tree.text(token).eq_ignore_ascii_case(b"THETA"))
+        };
+        let motions = || self.listing.motions.iter().zip(&self.contexts);
+        let first = |file: usize| {
+            let mut of_file = motions().filter(|(motion, _)| motion.place.file as usize == file);
+            let mut under_vector = |(motion, context): &(&Motion, &BlockContext)| {
+                context.orientation_mode == OrientationMode::Vector && motion.reason().is_none()
+            };
+            of_file.find(&mut under_vector).map(|(motion, _)| motion.place)
+        };
+        (0..self.trees.len()).filter(states_none).filter_map(first).collect()
     }
 
     /// See [`crate::motion::NcFacts::unstated_lengths`].

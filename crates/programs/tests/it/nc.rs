@@ -731,3 +731,20 @@ fn a_tool_whose_length_nothing_takes_over_is_told() {
     }
     assert_eq!(lines(Dialect::Iso, "T1 M6\n"), [0_u32; 0]);
 }
+
+/// The turn about a tool vector decides on the joints of a six-axis arm; where no word states it, it was taken as 0, and the result was "ok".
+#[test]
+fn a_turn_about_the_tool_vector_that_no_word_states_is_told() {
+    let lines = |dialect: Dialect, blocks: &str| {
+        let mut setup = Setup { dialect: Some(dialect), ..Setup::default() };
+        setup.tools.push(("T1".to_owned(), Frame::IDENTITY));
+        setup.frames.push(("G54".to_owned(), Frame::IDENTITY));
+        let listing = Task::read(&[("p.nc", blocks.as_bytes())], &setup).listing;
+        listing.nc.unstated_turns.iter().map(|place| place.line).collect::<Vec<_>>()
+    };
+    let siemens = "G90 G71 G17 G54\nT1 D1 M6\nTRAORI\nG1 X0 Y0 Z0 A3=0 B3=0 C3=1 F600\nX5\n";
+    assert_eq!(lines(Dialect::Siemens, siemens), [4]);
+    assert_eq!(lines(Dialect::Siemens, &siemens.replace("C3=1", "C3=1 THETA=0")), [0_u32; 0]);
+    let angles = siemens.replace("A3=0 B3=0 C3=1", "A180 B0 C0");
+    assert_eq!(lines(Dialect::Siemens, &format!("; truegrind angles wpr\n{angles}")), [0_u32; 0]);
+}

@@ -69,6 +69,10 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
              running the program",
         ),
         (
+            !listing.nc.unstated_turns.is_empty(),
+            "Corrected as if the turn about the tool vector were 0, but no word states it: state it, or A, B and C, before running the program",
+        ),
+        (
             depends_on_call(plan, listing),
             "Corrected, but a call of another program may change the modal state, and each NC program is read by itself: state it again after the \
              call, or check the motions there",
@@ -81,6 +85,11 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
             plan.unknown_loads > 0,
             "Corrected, but where GripLoad sets the load at run time only the load of the tool is used: check these motions before running the \
              program",
+        ),
+        (
+            plan.other_loads > 0,
+            "Corrected, but the program carries another load than the measurement did, and the deflection of this arm is known for that one alone: \
+             measure the arm with the load of the program, or check these motions before running it",
         ),
         (
             plan.is_overloaded,

@@ -296,6 +296,9 @@ fn verdict_and_page_tell_what_to_look_at() {
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
         assert!(text.contains(sentence), "{text}");
     }
+    let other = Plan { other_loads: 1, ..plan.clone() };
+    let text = terminal::document(&view::summary(&other, &listing, &files), 200);
+    assert!(text.contains("[warning] Corrected, but the program carries another load"), "{text}");
     let heavy = Plan { is_overloaded: true, ..plan.clone() };
     let text = terminal::document(&view::summary(&heavy, &listing, &files), 200);
     assert!(text.contains("[warning] Corrected for a mass far above what the robot is rated for"), "{text}");
@@ -303,6 +306,10 @@ fn verdict_and_page_tell_what_to_look_at() {
     open.nc.unstated_lengths = vec![listing.motions[0].place];
     let text = terminal::document(&view::summary(&plan, &open, &files), 200);
     assert!(text.contains("[warning] Corrected as if the tool length were active"), "{text}");
+    let mut turned = listing.clone();
+    turned.nc.unstated_turns = vec![listing.motions[0].place];
+    let text = terminal::document(&view::summary(&plan, &turned, &files), 200);
+    assert!(text.contains("[warning] Corrected as if the turn about the tool vector were 0"), "{text}");
     let last = listing.motions.len() as u32 - 1;
     for (call, is_depended_on) in [(0, true), (last, false)] {
         let mut called = listing.clone();

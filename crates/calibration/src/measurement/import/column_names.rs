@@ -8,6 +8,9 @@ pub(super) const QUATERNION: [&str; 4] = ["measured_qw", "measured_qx", "measure
 /// The controller's own read-out.
 pub(super) const READOUT: [&str; 3] = ["x", "y", "z"];
 
+/// The centre of mass of the payload.
+pub(super) const PAYLOAD_CENTRE: [&str; 3] = ["payload_x", "payload_y", "payload_z"];
+
 /// The sampling point of a row on a path.
 pub(super) const PATH: [&str; 3] = ["path", "cycle", "sample"];
 

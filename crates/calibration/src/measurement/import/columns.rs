@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::cell::{Line, Table};
-use super::column_names::{LETTERS, PATH, POSITION, QUATERNION, READOUT, joint, joint_number};
+use super::column_names::{
+    LETTERS, PATH, PAYLOAD_CENTRE, POSITION, QUATERNION, READOUT, joint, joint_number,
+};
 use super::error::{ImportError, Location};
 use super::stated_unit::{WithUnit, with_unit};
 use crate::measurement::dataset::Sensor;
@@ -28,6 +30,8 @@ pub(super) struct HeaderColumns {
     pub(super) time: Option<usize>,
     pub(super) temperature: Option<usize>,
     pub(super) payload: Option<usize>,
+    /// payload_x, payload_y, payload_z.
+    pub(super) payload_centre: Option<[usize; 3]>,
     /// session.
     pub(super) session: Option<usize>,
     /// approach1 to approach6, each where given.
@@ -87,6 +91,18 @@ impl HeaderColumns {
                 None
             }
         };
+        let payload_centre = match PAYLOAD_CENTRE.map(get) {
+            [Some(x), Some(y), Some(z)] if get("payload").is_some() => Some([x, y, z]),
+            [None, None, None] => None,
+            _ => {
+                notes.push(
+                    "the centre of the payload needs the columns payload, payload_x, payload_y and payload_z; found only some of them, so it is not \
+                     used"
+                        .into(),
+                );
+                None
+            }
+        };
         let approach = std::array::from_fn(|j| get(&format!("approach{}", j + 1)));
         notes.extend(part_of_path(&get, path));
         for name in &unused {
@@ -125,6 +141,7 @@ impl HeaderColumns {
             time: get("t"),
             temperature: get("temperature"),
             payload: get("payload"),
+            payload_centre,
             session: get("session").or(stations_of_cable),
             approach,
             anchor: get("anchor").filter(|_| of_cable),
@@ -304,6 +321,7 @@ pub(super) fn is_known(name: &str) -> bool {
         || POSITION.contains(&name)
         || QUATERNION.contains(&name)
         || READOUT.contains(&name)
+        || PAYLOAD_CENTRE.contains(&name)
 }
 
 /// Sentences on missing columns: each with a header that is probably meant for it, and all others in one.

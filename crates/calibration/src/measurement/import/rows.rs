@@ -187,22 +187,26 @@ const MAX_OUTLETS: usize = 64;
 /// Largest payload.
 const MAX_PAYLOAD_KG: f64 = 1e4;
 
+/// Largest distance of the centre of a payload from the flange along an axis.
+const MAX_PAYLOAD_CENTRE_MM: f64 = 1e4;
+
 /// Interned conditions: many rows share few of them.
 #[derive(Default)]
 struct Conditions {
     seen: HashMap<Bits, Arc<Condition>>,
 }
 
-/// The bits of a condition: time, temperature, payload; approach sides.
-type Bits = ([Option<u64>; 3], [i8; 6]);
+/// The bits of a condition: time, temperature, payload; its centre; approach sides.
+type Bits = ([Option<u64>; 3], [u64; 3], [i8; 6]);
 
 /// Most interned conditions; in a log with times every row has its own.
 const MAX_SHARED: usize = 4096;
 
 impl Conditions {
     fn share(&mut self, condition: Condition) -> Arc<Condition> {
-        let Condition { time_h, temperature_c, payload_kg, approach, .. } = condition;
-        let key = ([time_h, temperature_c, payload_kg].map(|value| value.map(f64::to_bits)), approach);
+        let Condition { time_h, temperature_c, payload_kg, payload_centre_mm, approach } = condition;
+        let logged = [time_h, temperature_c, payload_kg].map(|value| value.map(f64::to_bits));
+        let key = (logged, payload_centre_mm.map(f64::to_bits), approach);
         if let Some(shared) = self.seen.get(&key) {
             return shared.clone();
         }
@@ -221,6 +225,14 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// The centre of the payload; the flange where the cells are empty.
+    fn payload_centre_mm(&self, line: &Line, columns: &HeaderColumns) -> Result<[f64; 3], ImportError> {
+        let given = |c: &[usize; 3]| c.iter().any(|&i| !line.cells.get(i).is_none_or(Cell::is_empty));
+        let Some([x, y, z]) = columns.payload_centre.filter(given) else { return Ok([0.0; 3]) };
+        let at = |column| self.bounded(line, column, MAX_PAYLOAD_CENTRE_MM, "a length in mm, within ±10,000");
+        Ok([at(x)?, at(y)?, at(z)?])
+    }
+
     fn location(&self) -> Location {
         Location { sheet: self.sheet.map(Into::into), ..Location::file(self.file) }
     }
@@ -321,8 +333,8 @@ impl Reader<'_> {
             time_h: self.optional(line, columns.time)?,
             temperature_c: self.optional(line, columns.temperature)?,
             payload_kg,
+            payload_centre_mm: self.payload_centre_mm(line, columns)?,
             approach,
-            ..Condition::default()
         };
         let anchor = match self.optional(line, columns.anchor)?.zip(columns.anchor) {
             None => 0,

@@ -1,6 +1,6 @@
 //! Units that a header states behind the name: `q1 [deg]`, `measured_x (mm)`, `q1_deg`.
 
-use super::column_names::{POSITION, READOUT, joint};
+use super::column_names::{PAYLOAD_CENTRE, POSITION, READOUT, joint};
 
 /// A header with a unit.
 #[derive(Debug, PartialEq, Eq)]
@@ -64,7 +64,7 @@ pub(super) fn with_unit(header: &str) -> Option<WithUnit<'_>> {
         "t" => (false, &["h", "hour", "hours"]),
         "temperature" => (false, &["°C", "C", "degC"]),
         "payload" => (false, &["kg"]),
-        _ if READOUT.contains(&name) => (false, &MILLIMETRES),
+        _ if READOUT.contains(&name) || PAYLOAD_CENTRE.contains(&name) => (false, &MILLIMETRES),
         _ if name == "L" || POSITION.contains(&name) => (true, &MILLIMETRES),
         _ if joint(name).is_some() => (true, &["deg", "degree", "degrees", "°"]),
         _ => return None,

@@ -19,6 +19,7 @@ const QUATERNION: &str = "orientation of the target in the sensor's frame, a uni
 const TIME: &str = "hours since the start (may be empty)";
 const TEMPERATURE: &str = "temperature of the arm (°C, may be empty)";
 const PAYLOAD: &str = "load on the flange (kg, may be empty)";
+const PAYLOAD_CENTRE: &str = "its centre of mass in the flange frame (mm); empty: at the flange";
 const SESSION: &str =
     "any name; a new one where sensor or target may have shifted, which is then checked (may be empty)";
 const STATION: &str = "any name of the place where the sensor stood, the same where it was not moved on purpose; at least four poses from each \
@@ -39,7 +40,7 @@ const PATH: &str = "for rows read while the arm runs a path, which `accept` judg
 /// use truegrind_calibration::measurement::import::template::columns;
 ///
 /// let names: Vec<&str> = columns(Sensor::Cable).iter().map(|column| column.name).collect();
-/// assert!(names.join(",").starts_with("q1,q2,q3,q4,q5,q6,L,anchor,t,temperature,payload,session,x,y,z,approach1,"));
+/// assert!(names.join(",").starts_with("q1,q2,q3,q4,q5,q6,L,anchor,t,temperature,payload,payload_x,payload_y,payload_z,session,"));
 /// ```
 pub fn columns(sensor: Sensor) -> Vec<Column> {
     let of = |names: &[&'static str], meaning| {
@@ -62,6 +63,7 @@ pub fn columns(sensor: Sensor) -> Vec<Column> {
         of(&["t"], TIME),
         of(&["temperature"], TEMPERATURE),
         of(&["payload"], PAYLOAD),
+        of(&column_names::PAYLOAD_CENTRE, PAYLOAD_CENTRE),
         of(&["session"], SESSION),
         of(&column_names::READOUT, READOUT),
         of(&["approach1", "approach2", "approach3", "approach4", "approach5", "approach6"], APPROACH),

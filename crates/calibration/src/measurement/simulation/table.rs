@@ -47,12 +47,14 @@ pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
     let length = Format::new(recipe.rounding.reading_mm, 4);
     let readout = Format::new(recipe.rounding.readout_mm, 4);
     let quaternion = Format::new(None, 9);
-    let (hours, degrees, mass) = (Format::new(None, 5), Format::new(None, 3), Format::new(None, 3));
+    let (hours, degrees, mass, centre_mm) =
+        (Format::new(None, 5), Format::new(None, 3), Format::new(None, 3), Format::new(None, 3));
     let logged = !recipe.conditions.unlogged;
     let first = rows.first().map(|r| r.condition).unwrap_or_default();
     let time = logged && first.time_h.is_some();
     let temperature = logged && first.temperature_c.is_some();
     let payload = logged && first.payload_kg.is_some();
+    let centre = payload && first.payload_centre_mm != [0.0; 3];
     let approach = logged && recipe.conditions.approach != Approach::Unknown;
     let anchors = recipe.sensor.anchors() > 1;
 
@@ -78,6 +80,7 @@ pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
     name(time, &["t"]);
     name(temperature, &["temperature"]);
     name(payload, &["payload"]);
+    name(centre, &["payload_x", "payload_y", "payload_z"]);
     name(approach, &["approach1", "approach2", "approach3", "approach4", "approach5", "approach6"]);
     name(anchors, &["anchor"]);
     let mut out = header.join(",") + "\n";
@@ -103,6 +106,9 @@ pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
         optional(time, &hours, row.condition.time_h);
         optional(temperature, &degrees, row.condition.temperature_c);
         optional(payload, &mass, row.condition.payload_kg);
+        if centre {
+            cells.extend(row.condition.payload_centre_mm.map(|mm| centre_mm.write(mm)));
+        }
         if approach {
             cells.extend(row.condition.approach.map(|side| side.to_string()));
         }

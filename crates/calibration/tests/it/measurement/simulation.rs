@@ -119,7 +119,7 @@ fn rounding_leaves_its_steps() {
 fn circumstances_are_logged_and_felt() {
     let recipe = random(
         40,
-        "repeats = 2\n[circumstances]\nhours = 4.0\napproach = \"both\"\npayload_kg = [0.0, 2.0]\n\
+        "repeats = 2\n[circumstances]\nhours = 4.0\napproach = \"both\"\npayload_kg = [0.0, 2.0]\npayload_centre_mm = [10.0, 0.0, 80.0]\n\
          temperature = { start_c = 20.0, end_c = 32.0, time_constant_h = 1.0 }\n\
          [[arm.effect]]\neffect = \"backlash\"\njoint = 0\nplay_rad = 0.002\n",
     ) + TRACKER;
@@ -127,6 +127,7 @@ fn circumstances_are_logged_and_felt() {
     assert_eq!(data.rows.len(), 160);
     let last = *data.rows.last().unwrap().condition;
     assert_eq!((last.time_h, last.payload_kg), (Some(4.0), Some(2.0)));
+    assert_eq!(last.payload_centre_mm, [10.0, 0.0, 80.0]);
     assert!((last.temperature_c.unwrap() - (32.0 - 12.0 * (-4f64).exp())).abs() < 1e-3);
     let mut widest = 0f64;
     for pair in data.rows.iter().collect::<Vec<_>>().chunks(2) {

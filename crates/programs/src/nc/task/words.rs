@@ -118,7 +118,7 @@ impl<'s> Interpreter<'_, 's> {
             Some(b'Y') => put(&mut block.axes[1]),
             Some(b'Z') => put(&mut block.axes[2]),
             Some(b'C') if heidenhain && word.value == WordValue::Absent => {}
-            Some(b'C' | b'R') if comma => block.flags.corner = true,
+            Some(b'C' | b'R') if comma => block.flags.corner |= self.evaluate_word(&word).0 != Ok(0.0),
             // `,A45.`: the angle of the line.
             Some(_) if comma => block.unmodelled = Some(Reason::UnsupportedPath),
             Some(letter @ (b'A' | b'B' | b'C')) => put(&mut block.abc[usize::from(letter - b'A')]),
@@ -174,7 +174,9 @@ impl<'s> Interpreter<'_, 's> {
             (Dialect::Siemens, b"THETA") => block.spin = at,
             (Dialect::Siemens, b"CR") => block.radius = at,
             (Dialect::Siemens, b"TURN" | b"AR" | b"I1" | b"J1" | b"K1") => block.flags.special_arc = true,
-            (Dialect::Siemens, b"RND" | b"CHF" | b"CHR") => block.flags.corner = true,
+            (Dialect::Siemens, b"RND" | b"CHF" | b"CHR") => {
+                block.flags.corner |= self.evaluate_word(&word).0 != Ok(0.0);
+            }
             (Dialect::Siemens, b"RNDM") => {
                 block.flags.modal_corner = Some(self.evaluate_word(&word).0 != Ok(0.0));
             }

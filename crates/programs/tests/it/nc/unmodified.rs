@@ -51,9 +51,12 @@ fn rounded_corners_keep_their_lines() {
         &[
             ("X10\nX20 RND=2\nY30\nX40", &[path, corner, corner, None]),
             ("X10\nX20 CHF=2\nM8\nY30\nX40", &[path, corner, corner, None]),
+            // A corner of no size is none.
+            ("X10\nX20 RND=0\nY30 CHF=0\nX40", &[None, None, None, None]),
             ("RNDM=2\nX10\nX20\nRNDM=0\nX30\nX40", &[corner, corner, corner, None]),
         ],
     );
+    check(Fanuc, &[("X10.\nX20. ,R0\nY30.", &[None, None, None])]);
     check(Fanuc, &[("X10.\nX20. ,R2.\nY30. ,C1.\nX40.\nX50.", &[path, corner, corner, corner, None])]);
     check(Heidenhain, &[("L X+10\nL X+20\nRND R2\nL Y+30\nL X+40", &[path, corner, corner, corner, None])]);
 }
