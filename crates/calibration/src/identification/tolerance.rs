@@ -5,6 +5,7 @@
 use crate::identification::calibration::Frames;
 use crate::measurement::registration::TARGET_SIGMA_MM;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
+use crate::measurement::sensor::empirical::{TWO_JOINT_SIGMA_RAD, torque_power_sigma};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
@@ -144,15 +145,6 @@ pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
         Effect::SmoothCorrection(_) => SMOOTH_SIGMA_RAD,
     }
 }
-
-/// Priors of square and cube of a torque: relative to a compliance of 1e-5 rad/(N m) the same again at some 30 N m. Of 1 kg in place of some
-/// 10: per kg² and kg³.
-pub fn torque_power_sigma(has_masses: bool, parameter: usize) -> f64 {
-    if has_masses { [1e-6, 1e-7][parameter.min(1)] } else { 1e-4 }
-}
-
-/// Prior of an error that depends on two joints.
-pub const TWO_JOINT_SIGMA_RAD: f64 = 3e-4;
 
 /// Prior of relative thermal growth: aluminium by some 40 K.
 pub const GROWTH_SIGMA: f64 = 1e-3;

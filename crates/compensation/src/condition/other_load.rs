@@ -4,11 +4,15 @@ use super::overload::rated_payload_kg;
 use super::payload::payload_at;
 use crate::options::Options;
 use crate::plan::MotionOutcome;
+use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::motion::Listing;
 
 /// Share of the rated payload, or else of the measured load, by which a load may differ and still count as the same.
 const SAME_LOAD: f64 = 0.05;
+
+/// Standard gravity (m/s²).
+const STANDARD_GRAVITY: f64 = 9.806_65;
 
 /// A load up to this (kg) is none: tool0 weighs a gram.
 const NO_LOAD_KG: f64 = 0.1;
@@ -24,7 +28,33 @@ pub fn is_other_load(kg: f64, arm: &Estimated) -> bool {
     holds_for_one && (kg - measured_kg).abs() > same_kg.max(NO_LOAD_KG)
 }
 
-/// How many corrected motions carry such a load.
+/// Mass of the links beyond the base over the rated payload, of usual arms: 3 to 6.
+const MOVING_MASS: f64 = 4.0;
+
+/// What such a load would move the flange by with the arm stretched out (mm), if the links weigh what those of usual arms do: a deflection
+/// that was identified without masses is compliance times mass.
+fn deflection_mm(kg: f64, arm: &Estimated) -> f64 {
+    let measured_kg = arm.condition.payload_kg.unwrap_or(0.0);
+    let Some(rated_kg) = rated_payload_kg(&arm.robot) else { return f64::INFINITY };
+    let reach_m = |joint: usize| {
+        arm.model.links[joint..].iter().map(|link| link.a_mm.abs() + link.d_mm.abs()).sum::<f64>() * 1e-3
+    };
+    // Compliance times mass, and the lever of the load.
+    let of_effect = |effect: &Effect| match effect {
+        Effect::LumpedCompliance(e) => {
+            let upright = e.lump.iter().filter(|lump| lump.axis.is_none() && lump.moment.is_none());
+            upright.map(|lump| lump.factor.abs()).sum::<f64>() * reach_m(e.joint).powi(2)
+        }
+        Effect::LinkBending(e) if e.frame.is_some() => {
+            e.compliance_rad_per_nm.abs() * reach_m(e.joint).powi(2)
+        }
+        _ => 0.0,
+    };
+    let compliance = arm.model.effects.iter().map(of_effect).sum::<f64>() / (MOVING_MASS * rated_kg);
+    compliance * (kg - measured_kg).abs() * STANDARD_GRAVITY * 1e3
+}
+
+/// How many corrected motions carry such a load, and one that would move the flange by more than is stated of them.
 pub(crate) fn other_loads(
     listing: &Listing,
     arm: &Estimated,
@@ -35,6 +65,8 @@ pub(crate) fn other_loads(
         Some(loads) => payload_at(loads, index, &listing.motions[index], listing).map(|load| load.mass_kg),
         None => options.condition.payload_kg,
     };
-    let corrected = outcomes.iter().filter(|outcome| outcome.status.is_written());
-    corrected.filter_map(|outcome| kg(outcome.motion as usize)).filter(|kg| is_other_load(*kg, arm)).count()
+    let corrected = || outcomes.iter().filter(|outcome| outcome.status.is_written());
+    let stated = corrected().filter_map(|outcome| outcome.sigma_mm.get()).fold(0.0, f64::max);
+    let matters = |kg: &f64| is_other_load(*kg, arm) && deflection_mm(*kg, arm) > stated;
+    corrected().filter_map(|outcome| kg(outcome.motion as usize)).filter(matters).count()
 }

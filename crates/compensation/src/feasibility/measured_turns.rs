@@ -33,7 +33,10 @@ fn stands_alike_after_a_turn(arm: &Estimated, joint: usize) -> bool {
         && arm.model.effects.iter().all(|effect| match effect {
             Effect::JointCompliance(_)
             | Effect::LumpedCompliance(_)
+            | Effect::JointStiffness(_)
+            | Effect::TorquePowers(_)
             | Effect::LinkBending(_)
+            | Effect::GearTwoJoints(_)
             | Effect::Backlash(_)
             | Effect::ThermalDrift(_) => true,
             Effect::JointCoupling(_) | Effect::SmoothCorrection(_) => false,

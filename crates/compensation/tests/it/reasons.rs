@@ -171,7 +171,7 @@ fn scene(name: &str, source: &[u8]) -> Vec<Plan> {
         "singular" => options.min_singularity = 1.0,
         "unsure" => arm = unsure(),
         "elsewhere" => (arm.region.spacing_deg, arm.region.samples_deg) = (1.0, vec![[150.0; 6]]),
-        "narrow" => arm.region.max_deg[1] = 5.0,
+        "narrow" => (arm.region.min_deg[1], arm.region.max_deg[1]) = (-100.0, 5.0),
         "loose" => (options.tolerance_mm, options.circles) = (0.5, Circles::Segments),
         "joints" => options.joint_targets = true,
         "branch" => {
@@ -258,7 +258,7 @@ fn every_reason_there_is_shows_in_a_program() {
     elsewhere.region.samples_deg = vec![[150.0; 6]];
     look(&planned(&refusals, &elsewhere, &cell, &fine()));
     let mut narrow = known();
-    narrow.region.max_deg[1] = 5.0;
+    (narrow.region.min_deg[1], narrow.region.max_deg[1]) = (-100.0, 5.0);
     look(&planned(&refusals, &narrow, &cell, &fine()));
     // Axis 5 almost straight, so that a correction turns it to the other side; no bound on singularity.
     let mut near = String::from("MODULE M\n PROC main()\n");

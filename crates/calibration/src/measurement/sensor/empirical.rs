@@ -11,8 +11,6 @@ use truegrind_arm::effect::joint_load::PointMass;
 use truegrind_arm::effect::torque_powers::TorquePowers;
 use truegrind_arm::effect::two_joint_gear::TwoJointGear;
 
-use crate::identification::tolerance::{TWO_JOINT_SIGMA_RAD, torque_power_sigma};
-
 /// What loads a joint whose fault follows its static torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -184,6 +182,15 @@ pub enum EmpiricalFault {
         deep: bool,
     },
 }
+
+/// Priors of square and cube of a torque: relative to a compliance of 1e-5 rad/(N m) the same again at some 30 N m. Of 1 kg in place of some
+/// 10: per kg² and kg³.
+pub fn torque_power_sigma(has_masses: bool, parameter: usize) -> f64 {
+    if has_masses { [1e-6, 1e-7][parameter.min(1)] } else { 1e-4 }
+}
+
+/// Prior of an error that depends on two joints.
+pub const TWO_JOINT_SIGMA_RAD: f64 = 3e-4;
 
 /// Entries of the matrix that maps the direction of the beam, in the target's frame, to a shift of the target's centre.
 const FIRST: [&str; 8] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy"];

@@ -273,7 +273,16 @@ reflector_mm = [38.2, 12.6, 61.3]
 sigma_mm = 0.012
 joints_deg = 0.0005
 "#;
-    let (simulation, rows) = measured(recipe);
+    let (simulation, mut rows) = measured(recipe);
+    // Where the centre of the load is was not logged.
+    rows.rows = rows
+        .rows
+        .iter()
+        .map(|row| {
+            let condition = Condition { payload_centre_mm: [0.0; 3], ..*row.condition };
+            Row { condition: condition.into(), ..row.clone() }
+        })
+        .collect();
     let frames = candidate_frames(&rows, &simulation.nominal).unwrap();
     let found = diagnose(&rows, "abb-irb-120", &simulation.nominal, &frames[0], &Options::default(), &|_| {})
         .unwrap();
