@@ -97,7 +97,7 @@ kinds! {
     /// An error that depends on the angles of two joints.
     GearTwoJoints = "gear-two-joints",
         pattern: "the residual about joint {joint} oscillates with the angles of two joints",
-        remedy: "measure both joints over their whole range, one at a time and together; inspect the cable that crosses them";
+        remedy: "compensate with this model; inspect the cable or gear train that crosses both joints";
     /// A joint that yields under gravity.
     JointCompliance = "joint-compliance",
         pattern: "the residual follows the static torque on joint {joint}",
@@ -109,7 +109,7 @@ kinds! {
     /// A joint whose stiffness is not linear.
     JointStiffness = "joint-stiffness",
         pattern: "the residual about joint {joint} follows its torque, but not in proportion",
-        remedy: "measure this joint with and without load, approached under the same torque";
+        remedy: "compensate with this model, for the load of the measurement; check the preload of the gear";
     /// A joint whose zero moved: lost counts, a slipped belt, another mastering.
     JointZeroShift = "joint-zero-shift",
         pattern: "the residual about joint {joint} steps by one angle in these rows",

@@ -475,6 +475,10 @@ pub(super) fn remedy_left_out(effect: CauseKind, uncertain: bool) -> String {
         LinkBending => "check the bolts of this link",
         GearEccentricity => "at the next repair, look at the gear and the encoder ring",
         GearTransmission => "inspect the reducer for wear",
+        GearTwoJoints => {
+            "measure both joints over their whole range, one at a time and together; inspect the cable that crosses them"
+        }
+        JointStiffness => "measure this joint with and without load, approached under the same torque",
         Backlash => "approach every point from the same side",
         SmoothCorrection => return left,
         _ => effect.remedy(),
