@@ -53,6 +53,7 @@ mod sensor_causes;
 mod sensor_discrepancy;
 mod contract;
 pub mod newton;
+mod nonlinear_springs;
 mod design_effect;
 mod drift;
 pub mod extension;

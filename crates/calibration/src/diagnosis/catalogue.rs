@@ -11,13 +11,12 @@ use rayon::prelude::*;
 use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
 use super::design::{Design, Slopes};
 use super::extension::Subject;
-use crate::identification::calibration::{
-    Frames, LoadedRows, joint_rotations, sensor_shifts, sensor_turns, torques_under,
-};
+use super::nonlinear_springs;
+use crate::identification::calibration::{Frames, LoadedRows, joint_rotations, sensor_shifts, sensor_turns};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::repeated_poses::poses;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use crate::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault, Overturning, Pole};
+use crate::measurement::sensor::empirical::{EmpiricalFault, Overturning, Pole};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
@@ -525,70 +524,6 @@ const NEIGHBOURS: [(usize, usize); 10] =
 /// Orders of two-joint gear errors: eccentric and elliptic parts, as for a gear of its own.
 const TWO_JOINT_ORDERS: [[u8; 2]; 4] = [[1, 1], [1, 2], [2, 1], [2, 2]];
 
-/// Loads that are assumed of a joint where masses are not known: at elbow, wrist or flange, and between elbow and wrist.
-fn assumed_loads(joint: usize) -> &'static [AssumedLoad] {
-    use AssumedLoad::{ElbowAndWrist, Frame};
-    match joint {
-        1 => &[Frame(2), Frame(4), Frame(6), ElbowAndWrist],
-        2 => &[Frame(4), Frame(6)],
-        _ => &[Frame(6)],
-    }
-}
-
-/// Shares of the largest torque of the rows at which a joint that stiffens has yielded by half.
-const BENDS: [f64; 2] = [0.1, 0.3];
-
-/// Up to where powers of a torque count, as a share of the largest torque of the rows.
-const BEYOND: f64 = 1.1;
-
-/// Torque at which half of a play is closed, as a share of the largest: a step for the rows, and yet a slope that a solver can follow.
-const CLOSED: f64 = 0.01;
-
-/// A share of the largest torque of the rows about a joint (mN m), to two digits: one row more must not change a fault.
-fn torque_mnm(subject: &Subject<'_>, joint: usize, load: AssumedLoad, share: f64) -> u32 {
-    let torques = torques_under(&subject.observed.dataset, subject.nominal, load);
-    let largest = torques.iter().map(|t| t[joint].abs()).fold(0.0, f64::max);
-    let torque = (1e3 * share * largest).max(1.0);
-    let unit = 10_f64.powf(torque.log10().floor() - 1.0).max(1.0);
-    ((torque / unit).round() * unit) as u32
-}
-
-/// Springs of a joint that are not linear, with the number of variants.
-fn nonlinear_springs(
-    subject: &Subject<'_>,
-    joint: usize,
-    loads: &[AssumedLoad],
-) -> Vec<(EmpiricalFault, f64)> {
-    let torque = |load, share| torque_mnm(subject, joint, load, share);
-    let by_powers = loads.iter().map(|&load| {
-        let largest_mnm = torque(load, BEYOND);
-        (EmpiricalFault::NonlinearStiffness { joint, load, largest_mnm }, loads.len() as f64)
-    });
-    let hardening = loads.iter().flat_map(|&load| {
-        BENDS.map(|share| {
-            let bend_mnm = torque(load, share);
-            (EmpiricalFault::Hardening { joint, load, bend_mnm }, (BENDS.len() * loads.len()) as f64)
-        })
-    });
-    by_powers.chain(hardening).collect()
-}
-
-/// Play that its load closes, of joints that gravity loads, with the number of variants of each: where the centre of mass of what a joint
-/// carries is, is not known, so that it is put at elbow, wrist or flange.
-fn loaded_plays(subject: &Subject<'_>, moves: &dyn Fn(usize) -> bool) -> Vec<(EmpiricalFault, f64)> {
-    let known = subject.nominal.bodies.is_some().then_some(AssumedLoad::Masses);
-    let of_joint = |joint: usize| {
-        let all: Vec<AssumedLoad> = assumed_loads(joint).iter().copied().chain(known).collect();
-        let tried = all.len() as f64;
-        let play = move |load| {
-            let closed_mnm = torque_mnm(subject, joint, load, CLOSED);
-            (EmpiricalFault::LoadedPlay { joint, load, closed_mnm }, tried)
-        };
-        all.into_iter().map(play)
-    };
-    (1..5).filter(|&joint| moves(joint)).flat_map(of_joint).collect()
-}
-
 /// Two-joint gear errors of neighbours that move, with the number of variants of each. Only first orders where the axes are parallel:
 /// there the weight depends on both angles, so higher orders are also what a nonlinear spring, or backlash whose side follows the
 /// load, looks like.
@@ -688,16 +623,7 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     let wobble = |joint| [false, true].map(|radial| (EmpiricalFault::AxisWobble { joint, radial }, 2.0));
     out.extend((0..6).filter(|&joint| moves(joint)).flat_map(wobble));
     let exact = out.len();
-    let known = subject.nominal.bodies.is_some();
-    // About an upright axis gravity has no torque: the first joint has a spring only in an arm that leans.
-    let first = if known { AssumedLoad::Masses } else { AssumedLoad::Frame(6) };
-    let largest_mnm = torque_mnm(subject, 0, first, BEYOND);
-    out.push((EmpiricalFault::NonlinearStiffness { joint: 0, load: first, largest_mnm }, 1.0));
-    for joint in (1..5).filter(|&joint| moves(joint)) {
-        let loads = if known { &[AssumedLoad::Masses] } else { assumed_loads(joint) };
-        out.extend(nonlinear_springs(subject, joint, loads));
-    }
-    out.extend(loaded_plays(subject, &moves));
+    out.extend(nonlinear_springs::faults(subject, &moves));
     out.extend(two_joint_gears(subject.nominal, &moves));
     if dataset.sensor == Sensor::Cable {
         out.extend([(EmpiricalFault::Pulley, 1.0), (drum(dataset), 1.0)]);
