@@ -5,10 +5,10 @@
 //! Shapes: one column per joint in, twelve columns out (position and the three axes of the flange).
 //! Checked against: [`PreparedModel::forward`], row by row.
 
-use super::chain::{FrameColumns, last_frame};
+use super::chain::FrameColumns;
 use super::model::PreparedModel;
 use crate::joints::Joints;
-use truegrind_math::lanes::{AnyWidth, Real, SinCos, WIDTH, aligned, sin_cos, vectorised};
+use truegrind_math::lanes::{AnyWidth, Real, SinCos, WIDTH, aligned, vectorised};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 
 /// Controller angles of many rows (rad), one column per joint.
@@ -210,12 +210,7 @@ fn flange_frame<R: SinCos>(
     flange: &Option<FrameColumns<f64>>,
     angle: &[R; 6],
 ) -> FrameColumns<R> {
-    let rotation = arm.apply_effects(&arm.apply_joint_map(angle));
-    let (mut sin, mut cos) = (rotation, rotation);
-    for j in 0..6 {
-        (sin[j], cos[j]) = sin_cos(rotation[j]);
-    }
-    let end = last_frame(&arm.tables, &sin, &cos);
+    let end = arm.last_frame_of(angle);
     match flange {
         Some(flange) => end.compose(flange),
         None => end,

@@ -1,4 +1,4 @@
-//! Physical effects beyond rigid links, one file each: offsets of joint angles, growth of links.
+//! Physical effects beyond rigid links, one file each: offsets of joint angles, growth of links, motions of links against each other.
 //!
 //! Every joint effect is linear in its parameters: it adds Σ pₖ φₖ(u, condition) to the mapped joint angles u, so one
 //! set of regressors φ serves simulation, identification and compensation. Model selection is not
@@ -17,6 +17,8 @@ pub mod coupling;
 pub mod two_joint_gear;
 pub mod backlash;
 pub mod thermal;
+pub mod axis_wobble;
+pub mod base_tilt;
 pub mod smooth_correction;
 pub mod bounds;
 mod parameter;
@@ -25,7 +27,9 @@ mod statics;
 use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
+use self::axis_wobble::AxisWobble;
 use self::backlash::Backlash;
+use self::base_tilt::BaseTilt;
 use self::bending::Bending;
 use self::compliance::Compliance;
 use self::coupling::Coupling;
@@ -38,8 +42,10 @@ use self::smooth_correction::SmoothCorrection;
 use self::thermal::Thermal;
 use self::torque_powers::TorquePowers;
 use self::two_joint_gear::TwoJointGear;
+use crate::chain::Chain;
 use crate::condition::Condition;
 use crate::joints::MappedJoints;
+use crate::link_motion::LinkMotion;
 use truegrind_math::lanes::SinCos;
 
 pub use self::parameter::EffectParameter;
@@ -78,6 +84,10 @@ pub enum Effect {
     Backlash(Backlash),
     /// Links that grow with time or temperature.
     ThermalDrift(Thermal),
+    /// An axis that wobbles in its bearing.
+    AxisWobble(AxisWobble),
+    /// A base that tilts under the arm.
+    BaseTilt(BaseTilt),
     /// A learned smooth correction without a physical cause.
     SmoothCorrection(SmoothCorrection),
 }
@@ -97,6 +107,8 @@ macro_rules! each {
             Effect::JointCoupling($e) => $body,
             Effect::Backlash($e) => $body,
             Effect::ThermalDrift($e) => $body,
+            Effect::AxisWobble($e) => $body,
+            Effect::BaseTilt($e) => $body,
             Effect::SmoothCorrection($e) => $body,
         }
     };
@@ -116,6 +128,8 @@ impl Effect {
             Effect::JointCoupling(_) => "joint-coupling",
             Effect::Backlash(_) => "backlash",
             Effect::ThermalDrift(_) => "thermal-drift",
+            Effect::AxisWobble(_) => "axis-wobble",
+            Effect::BaseTilt(_) => "base-tilt",
             Effect::SmoothCorrection(_) => "smooth-correction",
         }
     }
@@ -133,7 +147,11 @@ impl Effect {
             Effect::GearTwoJoints(e) => Some(e.joint),
             Effect::JointCoupling(e) => Some(e.joint),
             Effect::Backlash(e) => Some(e.joint),
-            Effect::LinkBending(_) | Effect::ThermalDrift(_) | Effect::SmoothCorrection(_) => None,
+            Effect::AxisWobble(e) => Some(e.joint),
+            Effect::LinkBending(_)
+            | Effect::ThermalDrift(_)
+            | Effect::BaseTilt(_)
+            | Effect::SmoothCorrection(_) => None,
         }
     }
 
@@ -148,6 +166,7 @@ impl Effect {
             || matches!(self, Effect::LinkBending(bending) if bending.frame.is_some())
             || matches!(self, Effect::JointStiffness(spring) if !spring.mass.is_empty())
             || matches!(self, Effect::TorquePowers(powers) if !powers.mass.is_empty())
+            || matches!(self, Effect::BaseTilt(tilt) if tilt.term.iter().any(|term| term.frame.is_some()))
     }
 
     /// Whether all its parameters are 0: it changes nothing and is listed for the covariance alone.
@@ -198,11 +217,11 @@ impl Effect {
             Effect::JointCoupling(e) => e.add_offset(u, out),
             Effect::Backlash(e) => e.add_offset(condition, out),
             Effect::SmoothCorrection(e) => e.add_offset(u, out),
-            Effect::ThermalDrift(_) => {}
+            Effect::ThermalDrift(_) | Effect::AxisWobble(_) | Effect::BaseTilt(_) => {}
         }
     }
 
-    /// Adds the Jacobian times a step of u, for one row or several in lanes. The Jacobian of compliance, some 1e-3, is neglected,
+    /// Adds the Jacobian times a step of u, for one row or several in lanes. The Jacobian of what yields, some 1e-3, is neglected,
     /// which Newton's method tolerates.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn add_jacobian_product<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
@@ -219,7 +238,9 @@ impl Effect {
             | Effect::TorquePowers(_)
             | Effect::LinkBending(_)
             | Effect::Backlash(_)
-            | Effect::ThermalDrift(_) => {}
+            | Effect::ThermalDrift(_)
+            | Effect::AxisWobble(_)
+            | Effect::BaseTilt(_) => {}
         }
     }
 
@@ -237,6 +258,82 @@ impl Effect {
     /// Derivative of [`Effect::offset`] with respect to u.
     pub fn jacobian(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> Matrix6<f64> {
         each!(self, e => e.jacobian(statics, u, condition))
+    }
+
+    /// The first frame of the chain that it moves against the rest, with the link that ends there; 0 is the base. `None` where it moves none.
+    pub fn first_moved_frame(&self) -> Option<usize> {
+        match self {
+            Effect::AxisWobble(wobble) => Some(wobble.joint + 1),
+            Effect::BaseTilt(_) => Some(0),
+            _ => None,
+        }
+    }
+
+    /// That motion, for one row or several in lanes: at mapped angles `u`, with the frames at the joints' `rotations`.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub fn link_motion<R: SinCos>(
+        &self,
+        statics: &Statics,
+        (u, rotations): (&[R; 6], &[R; 6]),
+        condition: &Condition,
+        frames: &Chain<R>,
+    ) -> LinkMotion<R> {
+        match self {
+            Effect::AxisWobble(wobble) => wobble.motion(frames, rotations),
+            Effect::BaseTilt(tilt) => tilt.motion(statics, u, condition),
+            _ => LinkMotion::none(u[0]),
+        }
+    }
+
+    /// Derivatives of [`Effect::link_motion`] with respect to the parameters; empty for an effect that moves no link.
+    pub fn link_motion_regressors(
+        &self,
+        statics: &Statics,
+        (u, rotations): (&MappedJoints, &Vector6<f64>),
+        condition: &Condition,
+        frames: &Chain<f64>,
+    ) -> Vec<LinkMotion<f64>> {
+        match self {
+            Effect::AxisWobble(wobble) => wobble.motion_regressors(frames, &(*rotations).into()),
+            Effect::BaseTilt(tilt) => tilt.motion_regressors(statics, u, condition),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Derivatives of [`Effect::link_motion`] with respect to the rotations of the joints, with the axes of the moved joint held, and with
+    /// respect to the mapped angles.
+    pub fn link_motion_slopes(
+        &self,
+        statics: &Statics,
+        (u, rotations): (&MappedJoints, &Vector6<f64>),
+        condition: &Condition,
+        frames: &Chain<f64>,
+    ) -> [[LinkMotion<f64>; 6]; 2] {
+        let none = [LinkMotion::none(0.0); 6];
+        match self {
+            Effect::AxisWobble(wobble) => {
+                let mut out = none;
+                out[wobble.joint] = wobble.motion_slope(frames, &(*rotations).into());
+                [out, none]
+            }
+            Effect::BaseTilt(tilt) => [none, tilt.motion_slopes(statics, u, condition)],
+            _ => [none; 2],
+        }
+    }
+
+    /// Whether it depends on the payload.
+    pub fn depends_on_load(&self) -> bool {
+        let by_masses = |tilt: &BaseTilt| tilt.term.iter().any(|term| term.frame.is_none());
+        self.needs_torque() || matches!(self, Effect::BaseTilt(tilt) if by_masses(tilt))
+    }
+
+    /// How far that motion can be at most (mm), of a point within `extent_mm` of the base and under masses of `mass_kg`.
+    pub fn largest_link_motion_mm(&self, extent_mm: f64, mass_kg: f64) -> f64 {
+        match self {
+            Effect::AxisWobble(wobble) => wobble.largest_mm(2.0 * extent_mm),
+            Effect::BaseTilt(tilt) => tilt.largest_mm(extent_mm, mass_kg),
+            _ => 0.0,
+        }
     }
 
     /// Relative growth of all lengths.

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, cross, minus, scaled};
 use super::condition::Condition;
-use super::jacobian::effect_twist;
+use super::jacobian::EffectTwists;
 use super::model::{Model, PreparedModel};
 use super::parameter::{LinkCoordinate, Parameter};
 use super::region::Region;
@@ -419,9 +419,10 @@ impl Estimated {
             let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i][k]) };
             for k in 0..block.len() {
                 let frames = arm.frames(&row(k).joints);
+                let mut of_effects = EffectTwists::of(arm, &row(k).joints, &frames, point(k));
                 for (parameter, velocity) in self.order.iter().zip(&mut *velocities) {
                     if let Parameter::Effect { index, parameter } = *parameter {
-                        let twist = effect_twist(arm, &row(k).joints, &frames, index, parameter, &point(k));
+                        let twist = of_effects.twist(index, parameter);
                         (0..3).for_each(|i| velocity[i][k] = twist[i]);
                     }
                 }

@@ -307,8 +307,8 @@ impl<'a> Inverse<'a> {
     }
 }
 
-/// See [`Inverse::model_distance_mm`]. Effects rotate joints, except for the growth of links. A longer link moves everything behind
-/// it by the same length; a rotated one by at most the angle times the length of the arm, and once more through the rotation
+/// See [`Inverse::model_distance_mm`]. Effects rotate joints, except for the growth and the motions of links. A longer link moves everything
+/// behind it by the same length; a rotated one by at most the angle times the length of the arm, and once more through the rotation
 /// of the last frame under a target.
 fn model_distance_mm(estimated: &Model, condition: &Condition, nominal: &Model, extent_mm: f64) -> f64 {
     let links = estimated.links_at(condition);
@@ -316,7 +316,10 @@ fn model_distance_mm(estimated: &Model, condition: &Condition, nominal: &Model, 
         let turned = (a.alpha_rad - b.alpha_rad).abs() + (a.beta_rad - b.beta_rad).abs();
         (a.a_mm - b.a_mm).abs() + (a.d_mm - b.d_mm).abs() + 2.0 * extent_mm * turned
     };
-    links.iter().zip(&nominal.links).map(of).sum()
+    let bodies = estimated.bodies.iter().flatten().map(|body| body.mass_kg).sum::<f64>();
+    let mass_kg = bodies + condition.payload_kg.unwrap_or(0.0);
+    let moved: f64 = estimated.effects.iter().map(|e| e.largest_link_motion_mm(extent_mm, mass_kg)).sum();
+    links.iter().zip(&nominal.links).map(of).sum::<f64>() + moved
 }
 
 /// Whether two sets of margins belong to one branch; margins below the tolerance belong to both sides.

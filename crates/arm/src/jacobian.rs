@@ -10,7 +10,7 @@
 use nalgebra::{Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
 
 use super::chain::{Chain, cross, minus};
-use super::model::PreparedModel;
+use super::model::{MovedLinks, PreparedModel};
 use super::parameter::{LinkCoordinate, Parameter};
 use crate::joints::Joints;
 use truegrind_math::se3::{Pose, left_jacobian, pose_from_vector};
@@ -49,10 +49,31 @@ pub fn joint_jacobian(
     frames: &Chain<f64>,
     point: &[f64; 3],
 ) -> Matrix6<f64> {
-    let rotations = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|j| {
-        link_twist(frames, j, LinkCoordinate::Theta, point)
+    let moved = arm.link_motions(q);
+    let mut out = rotation_twists(frames, &moved, point) * arm.rotation_jacobian(q);
+    for MovedLinks { motion, by_mapped_angle, .. } in &moved {
+        let columns = by_mapped_angle.map(|change| motion.twist_vector(&change, point));
+        out += Matrix6::from_columns(&columns) * arm.model.joint_map;
+    }
+    out
+}
+
+/// Twists of a point for the rotation of each joint, with the motions of links that follow it.
+fn rotation_twists(frames: &Chain<f64>, moved: &[MovedLinks], point: &[f64; 3]) -> Matrix6<f64> {
+    let mut out = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|joint| {
+        link_twist(frames, joint, LinkCoordinate::Theta, point)
     }));
-    rotations * arm.rotation_jacobian(q)
+    for MovedLinks { first, motion, by_rotation, .. } in moved {
+        if let Some(joint) = first.checked_sub(1) {
+            // Moved after it has turned, what a joint carries turns about its moved axis.
+            let (axis, through) = (motion.turned(&frames.z[joint]), motion.moved(&frames.origin[joint]));
+            out.set_column(joint, &turning(&axis, &through, point));
+        }
+        for (mut column, change) in out.column_iter_mut().zip(by_rotation) {
+            column += motion.twist_vector(change, point);
+        }
+    }
+    out
 }
 
 /// An arm between a base frame and a tool frame, both given by translation and rotation vector.
@@ -102,6 +123,7 @@ pub fn parameter_jacobian(
         jacobian.column(k - 3).into_owned()
     };
     let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
+    let mut of_effects = EffectTwists::of(arm, q, &frames, point);
     let columns: Vec<Vector6<f64>> = parameters
         .iter()
         .map(|parameter| match *parameter {
@@ -115,9 +137,7 @@ pub fn parameter_jacobian(
                 let scale = if coordinate.is_length() { 1.0 + growth } else { 1.0 };
                 in_world(link_twist(&frames, joint, coordinate, &point) * scale)
             }
-            Parameter::Effect { index, parameter } => {
-                in_world(effect_twist(arm, q, &frames, index, parameter, &point))
-            }
+            Parameter::Effect { index, parameter } => in_world(of_effects.twist(index, parameter)),
             Parameter::Target(k) => {
                 let to_flange = base_from_flange.rotation;
                 if k < 3 {
@@ -136,27 +156,57 @@ pub fn parameter_jacobian(
     Matrix6xX::from_columns(&columns)
 }
 
-/// Twist of a point [mm, in the base] for one parameter of one effect.
-pub fn effect_twist(
-    arm: &PreparedModel<'_>,
-    q: &Joints,
-    frames: &Chain<f64>,
-    index: usize,
-    parameter: usize,
-    point: &[f64; 3],
-) -> Vector6<f64> {
-    let mut out = Vector6::zeros();
-    let rotation = arm.effect_regressors(index, q)[parameter];
-    for joint in (0..6).filter(|&j| rotation[j] != 0.0) {
-        out += link_twist(frames, joint, LinkCoordinate::Theta, point) * rotation[joint];
+/// Twists of a point [mm, in the base] for the parameters of effects.
+pub struct EffectTwists<'a> {
+    arm: &'a PreparedModel<'a>,
+    q: &'a Joints,
+    frames: &'a Chain<f64>,
+    point: [f64; 3],
+    /// For the rotation of each joint.
+    of_joints: Matrix6<f64>,
+    moved: Vec<MovedLinks>,
+    /// The effect that was asked for last, with the joint rotations and the growth per unit of its parameters.
+    latest: Option<(usize, Vec<Vector6<f64>>, Vec<f64>)>,
+}
+
+impl<'a> EffectTwists<'a> {
+    /// Of an arm at controller angles `q`, where its joint frames are `frames`.
+    pub fn of(arm: &'a PreparedModel<'a>, q: &'a Joints, frames: &'a Chain<f64>, point: [f64; 3]) -> Self {
+        let moved = arm.link_motions(q);
+        let of_joints = rotation_twists(frames, &moved, &point);
+        Self { arm, q, frames, point, of_joints, moved, latest: None }
     }
-    let growths = arm.model.effects[index].growth_regressors(&arm.condition);
-    let growth = growths.get(parameter).copied().unwrap_or(0.0);
-    if growth != 0.0 {
-        for (joint, link) in arm.model.links.iter().enumerate() {
-            out += link_twist(frames, joint, LinkCoordinate::A, point) * (growth * link.a_mm);
-            out += link_twist(frames, joint, LinkCoordinate::D, point) * (growth * link.d_mm);
+
+    /// The twist for one parameter of effect `index`.
+    pub fn twist(&mut self, index: usize, parameter: usize) -> Vector6<f64> {
+        let effect = &self.arm.model.effects[index];
+        let (rotation, growth) = match &self.latest {
+            Some((latest, rotations, growths)) if *latest == index => {
+                (rotations[parameter], growths.get(parameter).copied())
+            }
+            _ => {
+                let rotations = self.arm.effect_regressors(index, self.q);
+                let growths = effect.growth_regressors(&self.arm.condition);
+                let of_this = (rotations[parameter], growths.get(parameter).copied());
+                self.latest = Some((index, rotations, growths));
+                of_this
+            }
+        };
+        let mut out = Vector6::zeros();
+        for joint in (0..6).filter(|&j| rotation[j] != 0.0) {
+            out += self.of_joints.column(joint) * rotation[joint];
         }
+        let growth = growth.unwrap_or(0.0);
+        if growth != 0.0 {
+            for (joint, link) in self.arm.model.links.iter().enumerate() {
+                let along = |coordinate| link_twist(self.frames, joint, coordinate, &self.point);
+                out += along(LinkCoordinate::A) * (growth * link.a_mm);
+                out += along(LinkCoordinate::D) * (growth * link.d_mm);
+            }
+        }
+        if let Some(moved) = self.moved.iter().find(|moved| moved.index == index) {
+            out += moved.motion.twist_vector(&moved.by_parameter[parameter], &self.point);
+        }
+        out
     }
-    out
 }

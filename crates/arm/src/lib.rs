@@ -19,6 +19,7 @@ mod body;
 pub mod effect;
 pub mod model;
 pub mod chain;
+pub mod link_motion;
 pub mod parameter;
 pub mod jacobian;
 pub mod arm_file;

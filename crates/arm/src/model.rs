@@ -2,10 +2,11 @@
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use super::chain::{self, Chain, LinkTable};
+use super::chain::{self, Chain, FrameColumns, LinkTable};
 use super::condition::Condition;
 use super::effect::{Effect, Statics};
 use super::link::Link;
+use super::link_motion::LinkMotion;
 use truegrind_math::lanes::{Real, SinCos, sin_cos};
 use truegrind_math::se3::Pose;
 
@@ -117,6 +118,7 @@ impl Model {
             tables: chain::tables(&self.links_at(condition)),
             statics: (!self.effects.is_empty()).then(|| self.statics()),
             loaded: self.effects.iter().any(Effect::needs_torque),
+            moves_links: self.effects.iter().any(|effect| effect.first_moved_frame().is_some()),
             has_identity_map: self.joint_map == Matrix6::identity(),
         }
     }
@@ -154,6 +156,8 @@ pub struct PreparedModel<'a> {
     of_effects: Condition,
     statics: Option<Statics>,
     loaded: bool,
+    /// Whether an effect moves links against each other or against the base.
+    moves_links: bool,
     /// Whether the joint map is the identity.
     has_identity_map: bool,
 }
@@ -172,12 +176,45 @@ impl PreparedModel<'_> {
     /// All joint frames in the base, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn frames_of<R: SinCos>(&self, q: &[R; 6]) -> Chain<R> {
-        let rotation = self.apply_effects(&self.apply_joint_map(q));
-        let (mut sin, mut cos) = (rotation, rotation);
+        self.frames_at(&self.apply_joint_map(q))
+    }
+
+    /// The same for mapped angles.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn frames_at<R: SinCos>(&self, mapped: &[R; 6]) -> Chain<R> {
+        let rotations = self.apply_effects(mapped);
+        let (mut sin, mut cos) = (rotations, rotations);
         for i in 0..6 {
-            (sin[i], cos[i]) = sin_cos(rotation[i]);
+            (sin[i], cos[i]) = sin_cos(rotations[i]);
         }
-        chain::chain(&self.tables, &sin, &cos)
+        let mut frames = chain::chain(&self.tables, &sin, &cos);
+        if self.moves_links
+            && let Some(statics) = &self.statics
+        {
+            for effect in &self.model.effects {
+                if let Some(first) = effect.first_moved_frame() {
+                    let motion = effect.link_motion(statics, (mapped, &rotations), &self.of_effects, &frames);
+                    frames.carry(first, &motion);
+                }
+            }
+        }
+        frames
+    }
+
+    /// The last frame alone, with the bits of [`PreparedModel::frames_of`].
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn last_frame_of<R: SinCos>(&self, q: &[R; 6]) -> FrameColumns<R> {
+        let mapped = self.apply_joint_map(q);
+        if self.moves_links {
+            let frames = self.frames_at(&mapped);
+            return FrameColumns { axes: [frames.x, frames.y[5], frames.z[6]], origin: frames.origin[6] };
+        }
+        let rotations = self.apply_effects(&mapped);
+        let (mut sin, mut cos) = (rotations, rotations);
+        for i in 0..6 {
+            (sin[i], cos[i]) = sin_cos(rotations[i]);
+        }
+        chain::last_frame(&self.tables, &sin, &cos)
     }
 
     /// DH joint rotations (offsets of the links not included): joint map, then the joint effects.
@@ -271,4 +308,60 @@ impl PreparedModel<'_> {
             _ => Vec::new(),
         }
     }
+
+    /// Motions of links per unit of each parameter of effect `index`; empty of an effect that moves none.
+    pub fn link_motion_regressors(&self, index: usize, q: &Joints) -> Vec<LinkMotion<f64>> {
+        let (Some(statics), Some(effect)) = (&self.statics, self.model.effects.get(index)) else {
+            return Vec::new();
+        };
+        let mapped = self.model.mapped(q);
+        let rotations = self.apply_effects(&mapped.into());
+        let frames = chain::chain(&self.tables, &rotations.map(f64::sin), &rotations.map(f64::cos));
+        effect.link_motion_regressors(statics, (&mapped, &rotations.into()), &self.of_effects, &frames)
+    }
+
+    /// The motion of links by all effects together, small as they are.
+    pub fn link_motion(&self, q: &Joints) -> Option<LinkMotion<f64>> {
+        let mut out = LinkMotion::none(0.0);
+        let moved = self.link_motions(q);
+        moved.iter().for_each(|moved| out.add(1.0, &moved.motion));
+        (!moved.is_empty()).then_some(out)
+    }
+
+    /// The motions of links by effects, in their order.
+    pub fn link_motions(&self, q: &Joints) -> Vec<MovedLinks> {
+        let Some(statics) = self.statics.as_ref().filter(|_| self.moves_links) else { return Vec::new() };
+        let mapped = self.model.mapped(q);
+        let rotations = self.apply_effects(&mapped.into());
+        let mut frames = chain::chain(&self.tables, &rotations.map(f64::sin), &rotations.map(f64::cos));
+        let angles = (&mapped, &rotations.into());
+        let mut out = Vec::new();
+        for (index, effect) in self.model.effects.iter().enumerate() {
+            let Some(first) = effect.first_moved_frame() else { continue };
+            let of = &self.of_effects;
+            let motion = effect.link_motion(statics, (&mapped.into(), &rotations), of, &frames);
+            let [by_rotation, by_mapped_angle] = effect.link_motion_slopes(statics, angles, of, &frames);
+            let by_parameter = effect.link_motion_regressors(statics, angles, of, &frames);
+            out.push(MovedLinks { index, first, motion, by_parameter, by_rotation, by_mapped_angle });
+            frames.carry(first, &motion);
+        }
+        out
+    }
+}
+
+/// The motion of links by an effect, with its derivatives.
+#[derive(Debug, Clone)]
+pub struct MovedLinks {
+    /// The effect in the model's list.
+    pub index: usize,
+    /// The first frame that moves, 0 the base.
+    pub first: usize,
+    /// The motion.
+    pub motion: LinkMotion<f64>,
+    /// With respect to each parameter.
+    pub by_parameter: Vec<LinkMotion<f64>>,
+    /// With respect to the rotation of each joint, whose axes are held.
+    pub by_rotation: [LinkMotion<f64>; 6],
+    /// With respect to each mapped angle.
+    pub by_mapped_angle: [LinkMotion<f64>; 6],
 }

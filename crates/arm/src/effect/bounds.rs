@@ -1,6 +1,7 @@
 //! Which parameters an effect may have that comes from a file.
 
 use super::Effect;
+use super::base_tilt::BaseTilt;
 use super::bending::Bending;
 use super::error_map::ErrorMap;
 use super::joint_load::PointMass;
@@ -18,6 +19,11 @@ const COMPLIANCE: Bound =
     Bound::new(-1.0, 1.0, "a compliance in rad/(N m), times kg where masses are lumped, within ±1");
 const MASS_KG: Bound = Bound::new(0.0, 1e5, "a mass in kg, not negative");
 const TORQUE_NM: Bound = Bound::new(1e-6, 1e6, "a torque in N m, above 0");
+/// Run-out of a bearing.
+const RUN_OUT_MM: Bound = Bound::new(-10.0, 10.0, "a length in mm, within ±10");
+/// Sway of a base, lumped masses in it or not.
+const SWAY: Bound =
+    Bound::new(-1e3, 1e3, "a compliance in mm/(N m), times kg where masses are lumped, within ±1000");
 const ORDER: Bound = Bound::new(1e-3, 1e5, "periods per turn of the joint, above 0");
 const GROWTH: Bound = Bound::new(-0.1, 0.1, "a relative growth within ±0.1");
 const TIME_H: Bound = Bound::new(1e-6, 1e6, "a time in hours, above 0");
@@ -68,6 +74,11 @@ impl Effect {
             }
             Effect::Backlash(e) => OFFSET_RAD.check("play_rad", e.play_rad),
             Effect::ThermalDrift(e) => thermal(e),
+            Effect::AxisWobble(e) => {
+                OFFSET_RAD.check_all("tilt_rad", &e.tilt_rad)?;
+                RUN_OUT_MM.check_all("radial_mm", e.radial_mm.as_slice().as_flattened())
+            }
+            Effect::BaseTilt(e) => tilt_terms(e),
             Effect::SmoothCorrection(e) => smooth(e),
         }
     }
@@ -110,6 +121,25 @@ fn lumps(load: &LumpedCompliance) -> Result<(), InvalidValue> {
             }
         }
         COMPLIANCE.check("lump.factor", lump.factor)?;
+    }
+    Ok(())
+}
+
+fn tilt_terms(tilt: &BaseTilt) -> Result<(), InvalidValue> {
+    count("term", tilt.term.len(), 1, "1 to 10,000 terms")?;
+    for term in &tilt.term {
+        if let Some(frame) = term.frame.filter(|frame| !(1..=6).contains(frame)) {
+            return Err(InvalidValue::new("term.frame", frame.to_string(), "a frame from 1 to 6"));
+        }
+        if let Some(axis) = term.about.iter().flatten().find(|axis| **axis > 2) {
+            return Err(InvalidValue::new("term.about", axis.to_string(), "axes from 0 to 2"));
+        }
+        if !tilt.deep && term.sway_mm_per_nm != 0.0 {
+            let found = format!("{} of a base that is not deep", term.sway_mm_per_nm);
+            return Err(InvalidValue::new("term.sway_mm_per_nm", found, "0, or deep = true"));
+        }
+        COMPLIANCE.check("term.tilt_rad_per_nm", term.tilt_rad_per_nm)?;
+        SWAY.check("term.sway_mm_per_nm", term.sway_mm_per_nm)?;
     }
     Ok(())
 }

@@ -64,10 +64,29 @@ impl Statics {
         out
     }
 
-    /// Moment of gravity on everything that moves about the origin of the base (N m): what overturns the arm's pedestal.
-    pub fn overturning_moment(&self, u: &MappedJoints, condition: &Condition) -> Vector3<f64> {
-        let (_, levers) = self.levers::<f64>(&(*u).into(), condition);
-        cross(&levers[0], &self.gravity_newton()).into()
+    /// The frames, and the moment of gravity on everything that moves about the origin of the base (N m): what overturns its pedestal.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn overturning<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> (Chain<R>, [R; 3]) {
+        let (frames, levers) = self.levers(u, condition);
+        let moment = cross(&levers[0], &splats(u[0], &self.gravity_newton()));
+        (frames, moment)
+    }
+
+    /// The frames, and the derivatives of that moment with respect to the mapped angles: a joint turns all that is beyond it.
+    pub(super) fn overturning_slopes(
+        &self,
+        u: &MappedJoints,
+        condition: &Condition,
+    ) -> (Chain<f64>, [[f64; 3]; 6]) {
+        let (frames, levers) = self.levers::<f64>(&(*u).into(), condition);
+        let g = self.gravity_newton();
+        let slopes = std::array::from_fn(|j| cross(&cross(&frames.z[j], &levers[j]), &g));
+        (frames, slopes)
+    }
+
+    /// Direction of gravity in the base.
+    pub(super) fn gravity(&self) -> [f64; 3] {
+        self.gravity.into()
     }
 
     /// Weight of a kilogram, with metres for the millimetres of the levers.

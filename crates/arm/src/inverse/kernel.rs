@@ -3,7 +3,7 @@
 //! Method: the missing twist is taken at the wrist point, which joints 4 to 6 hardly move. The Jacobian is then [A B; C D] with
 //! A (3 × 3, translation by joints 1 to 3) far from singular wherever shoulder and elbow are, and A⁻¹ and the inverse of the
 //! Schur complement S = D − C A⁻¹ B follow from cross products without pivoting. The Jacobian σ of the effects enters as
-//! Δu = (I − σ) Δθ, exact to σ²; that of compliance (some 1e-3) is neglected and costs at most one step more.
+//! Δu = (I − σ) Δθ, exact to σ²; that of what yields (some 1e-3) is neglected and costs at most one step more.
 //! Shapes: `R` is one row or several; unknowns are the mapped joint angles u (rad).
 //! Termination: a row is frozen once it is within [`TOLERANCE_MM`] and [`TOLERANCE_RAD`], so it gets the same bits whatever its
 //! neighbours do; a row with a step longer than [`MAX_STEP_RAD`] or more than [`MAX_STEPS`] steps is left to [`super::newton`].
@@ -14,10 +14,10 @@
 use super::newton::{TOLERANCE_MM, TOLERANCE_RAD};
 use super::solution::Solution;
 use super::structure::Structure;
-use crate::chain::{Chain, FrameColumns, chain, cross, dot, minus};
+use crate::chain::{Chain, FrameColumns, cross, dot, minus};
 use crate::joints::Joints;
 use crate::model::PreparedModel;
-use truegrind_math::lanes::{SinCos, sin_cos, splats};
+use truegrind_math::lanes::{SinCos, splats};
 
 /// Most steps of a row.
 const MAX_STEPS: usize = 8;
@@ -249,7 +249,7 @@ impl Kernel {
         let mut first_margins = [zero; 3];
         let mut step = 0;
         loop {
-            let frames = self.frames(arm, &mapped);
+            let frames = arm.frames_at(&mapped);
             let axes = [frames.x, frames.y[5], frames.z[6]];
             let wrist = at(&frames.origin[6], &axes, &self.wrist_mm);
             let flange = at(&frames.origin[6], &axes, &self.flange_mm);
@@ -308,16 +308,5 @@ impl Kernel {
                 };
             }
         }
-    }
-
-    /// Joint frames for mapped angles.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn frames<R: SinCos>(&self, arm: &PreparedModel<'_>, mapped: &[R; 6]) -> Chain<R> {
-        let rotations = arm.apply_effects(mapped);
-        let (mut sin, mut cos) = (rotations, rotations);
-        for i in 0..6 {
-            (sin[i], cos[i]) = sin_cos(rotations[i]);
-        }
-        chain(&arm.tables, &sin, &cos)
     }
 }

@@ -6,6 +6,8 @@ use nalgebra::{Matrix6, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::axis_wobble::AxisWobble;
+use truegrind_arm::effect::base_tilt::{BaseTilt, TiltTerm};
 use truegrind_arm::effect::bending::Bending;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
@@ -452,6 +454,18 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
         growth_per_k: 1e-5,
         reference_c: 20.0,
     }));
+    let term =
+        |frame, about, tilt_rad_per_nm| TiltTerm { frame, about, tilt_rad_per_nm, sway_mm_per_nm: 0.0 };
+    let term = vec![
+        TiltTerm { sway_mm_per_nm: 5e-4, ..term(None, None, 1e-6) },
+        TiltTerm { sway_mm_per_nm: -2e-4, ..term(None, Some([0, 1]), 5e-7) },
+        term(Some(4), Some([1, 1]), 1e-5),
+    ];
+    out.effects.push(Effect::BaseTilt(BaseTilt { deep: true, term }));
+    for (joint, radial_mm) in [(1, None), (3, Some([0.02, -0.01, 0.01, 0.03]))] {
+        let tilt_rad = [1e-4, -5e-5, 8e-5, 3e-5];
+        out.effects.push(Effect::AxisWobble(AxisWobble { joint, tilt_rad, radial_mm }));
+    }
     out.effects.push(Effect::SmoothCorrection(SmoothCorrection {
         centres_rad: vec![[0.0, 0.3, -0.2], [0.8, -0.4, 0.5], [-0.9, 0.1, 1.0]],
         reach_rad: 1.6,

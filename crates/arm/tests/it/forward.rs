@@ -68,6 +68,8 @@ fn the_kernel_agrees_with_the_product_of_link_poses() {
     let condition = Condition { payload_kg: Some(2.0), ..Condition::default() };
     for sheet in SHEETS {
         let mut model = with_effects(&perturbed(&sheet.model(), &mut random, 2.0, 1.0), &mut random);
+        // Motions of links have tests of their own.
+        model.effects.retain(|effect| effect.first_moved_frame().is_none());
         model.flange = Pose::new(Vector3::new(10.0, -20.0, 30.0), Vector3::new(0.1, 0.2, -0.3));
         let posed = model.at_condition(&condition);
         for _ in 0..50 {

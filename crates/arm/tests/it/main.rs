@@ -18,6 +18,7 @@ mod gram;
 mod inverse;
 mod inverse_path;
 mod jacobian;
+mod link_motion;
 mod lanes;
 mod se3;
 mod work;

@@ -12,7 +12,9 @@ use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
 use super::design::{Design, Slopes};
 use super::extension::Subject;
 use super::nonlinear_springs;
-use crate::identification::calibration::{Frames, LoadedRows, joint_rotations, sensor_shifts, sensor_turns};
+use crate::identification::calibration::{
+    Frames, LoadedRows, joint_rotations, motions_by_links, sensor_shifts, sensor_turns,
+};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::repeated_poses::poses;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
@@ -83,6 +85,7 @@ impl Candidate {
     pub fn of(cause: &Cause, subject: &Subject<'_>) -> Self {
         let (dataset, nominal) = (&subject.observed.dataset, subject.nominal);
         match cause {
+            Cause::Arm(effect) if effect.first_moved_frame().is_some() => Self::moving_links(effect, subject),
             Cause::Arm(effect) => Self::arm(effect.clone(), dataset, nominal),
             Cause::Measurement(d) => Self::measurement(d.clone(), dataset, nominal, subject.frames),
         }
@@ -126,6 +129,18 @@ impl Candidate {
             })
             .collect();
         Self { cause: Cause::Arm(effect), regressors, tried: 1.0 }
+    }
+
+    /// A candidate that moves links, which is a sensor that moves.
+    fn moving_links(effect: &Effect, subject: &Subject<'_>) -> Self {
+        let dataset = &subject.observed.dataset;
+        let motions = motions_by_links(effect, dataset, subject.nominal, subject.frames);
+        let coordinates = if dataset.sensor == Sensor::Pose { 6 } else { 3 };
+        let regressors = motions.iter().map(|rows| {
+            let of = |k: usize| rows.iter().map(|motion| motion[k / 3][k % 3]).collect::<Vec<f64>>();
+            Regressor::Shift((0..coordinates).map(of).collect())
+        });
+        Self { cause: Cause::Arm(effect.clone()), regressors: regressors.collect(), tried: 1.0 }
     }
 
     /// A candidate in the measurement.

@@ -5,8 +5,6 @@ use crate::identification::tolerance::{Tolerance, effect_sigma};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::{EmpiricalFault, Overturning, Pole};
 use truegrind_arm::effect::Effect;
-use truegrind_arm::effect::compliance::Compliance;
-use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
 use truegrind_arm::model::Model;
 
 /// A possible cause of errors.
@@ -152,7 +150,7 @@ impl Cause {
         }
     }
 
-    /// The effect of the arm that an empirical fault of it is, at size 0; `None` for faults that no model file can carry.
+    /// The effect of the arm that an empirical fault of it is, at size 0; `None` of any other cause.
     pub fn effect(&self) -> Option<Effect> {
         match self {
             Cause::Measurement(Disturbance {
@@ -164,24 +162,9 @@ impl Cause {
         }
     }
 
-    /// What of a fault of the arm a model file can carry, at size 0: the effect that it is, and of a base that tilts what a second joint
-    /// that yields does, since its axis is horizontal and its torque differs from the overturning moment by a constant.
-    pub fn stand_in(&self) -> Option<Self> {
-        let in_part = || {
-            let Cause::Measurement(Disturbance { kind, .. }) = self else { return None };
-            match kind {
-                Kind::Empirical(EmpiricalFault::BaseTilt { load: Overturning::Masses, .. }) => {
-                    Some(Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: 0.0 }))
-                }
-                Kind::Empirical(EmpiricalFault::BaseTilt { load: Overturning::Lumps, .. }) => {
-                    let lump = |frame| Lump { frame, axis: None, moment: None, factor: 0.0 };
-                    let lump = [2, 4, 6].map(lump).to_vec();
-                    Some(Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump }))
-                }
-                _ => None,
-            }
-        };
-        self.effect().or_else(in_part).map(Cause::Arm)
+    /// The cause as a written arm has it: a fault of the arm as the effect that it is, of size 0; any other as it is.
+    pub fn as_written(&self) -> Self {
+        self.effect().map_or_else(|| self.clone(), Cause::Arm)
     }
 
     /// Whether it varies slowly with the joint angles, like the residue of an unknown fault.
@@ -304,7 +287,8 @@ impl Cause {
                 kind: Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),
                 ..
             }) => Part::Backlash,
-            Cause::Measurement(Disturbance {
+            Cause::Arm(Effect::AxisWobble(_))
+            | Cause::Measurement(Disturbance {
                 kind: Kind::Empirical(EmpiricalFault::AxisWobble { .. }),
                 ..
             }) => Part::Bearing,

@@ -215,6 +215,8 @@ impl From<&Effect> for CauseKind {
             Effect::JointCoupling(_) => CauseKind::JointCoupling,
             Effect::Backlash(_) => CauseKind::Backlash,
             Effect::ThermalDrift(_) => CauseKind::ThermalDrift,
+            Effect::AxisWobble(_) => CauseKind::AxisWobble,
+            Effect::BaseTilt(_) => CauseKind::BaseTilt,
             Effect::SmoothCorrection(_) => CauseKind::SmoothCorrection,
         }
     }

@@ -309,15 +309,6 @@ impl Linear {
         residual
     }
 
-    /// A change of the readings, n, without what a change of the parameters absorbs.
-    pub(super) fn unabsorbed(&self, change: &DVector<f64>) -> DVector<f64> {
-        let mut left = change.clone();
-        if let Some(absorbed) = back_and_forth(&lower_factor(self.normal().clone()), &(&self.rows * change)) {
-            left.gemv_tr(-1.0, &self.rows, &absorbed, 1.0);
-        }
-        left
-    }
-
     /// The parameters after one Gauss–Newton step beside random effects, `columns`, n × m, with coefficients of variance 1, and noise that is
     /// `noise` times the assumed one; and their covariance.
     ///

@@ -3,7 +3,7 @@
 use super::cause::Cause;
 use super::discrepancy::Discrepancy;
 use super::extension::Extended;
-use super::in_doubt::{self, MissingError};
+use super::in_doubt;
 use super::joint_scatter::JointScatter;
 use super::link_geometry::LINK_Z;
 use super::options::Options;
@@ -11,7 +11,9 @@ use super::search::{Search, SearchContext};
 use super::selection::contains_cause;
 use super::sensor_causes::{self, Apart, apart};
 use super::validation::{ErrorsByStage, StageError};
-use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
+use super::written_model::{
+    certain_causes, fit_written, time_discrepancy, under_correlated_noise, written_causes,
+};
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
 use crate::identification::calibration::Frames;
@@ -212,7 +214,9 @@ impl Handover<'_> {
             .beyond_noise
             .known_mm()
             .and_then(|mm| joint_errors_rad(&estimated, &fitted.frames.flange_from_target, mm));
-        in_doubt::add_missing_errors(&mut estimated, self.missing_errors(arm));
+        if let Some(scatter) = &self.scatter {
+            in_doubt::add_joint_scatter(&mut estimated, scatter);
+        }
         let mut estimated = with_sigma_in_region(estimated, handed);
         let benefit = match &self.few_poses {
             Some(few) => Err(NoBenefit::FewPoses(few.clone())),
@@ -265,18 +269,6 @@ impl Handover<'_> {
         let steps = self.search.full_fit.causes.iter().filter_map(Cause::scale_step);
         let shown = steps.map(|step| step.abs() * FRAC_1_SQRT_2);
         shown.chain(self.search.context.options.arm_tolerance.scale).reduce(f64::max)
-    }
-
-    /// Errors of the causes that an arm cannot have.
-    fn missing_errors(&self, arm: &WrittenArm<'_>) -> Vec<MissingError> {
-        let search = self.search;
-        let mut missing =
-            in_doubt::missing_errors(&search.context.subject, &search.full_fit, arm.with_uncertain);
-        // What a fault of the joint without a file leaves is known better than its scatter.
-        let scatter = self.scatter.as_ref().map(MissingError::scatter);
-        missing
-            .extend(scatter.filter(|scatter| !missing.iter().any(|other| other.joint() == scatter.joint())));
-        missing
     }
 
     /// What an arm leaves beyond the noise.
@@ -385,7 +377,6 @@ fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Dis
     };
     let found = of(certain);
     let of_the_arm = |cause: &Cause| matches!(cause, Cause::Arm(_));
-    let is_carried = |cause: &Cause| of_the_arm(cause) || cause.stand_in().is_some();
     let better = |than: &StageError| {
         found.errors.random.rmse < than.random.rmse && found.errors.blocks.rmse < than.blocks.rmse
     };
@@ -395,7 +386,7 @@ fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Dis
     }
     let causes = &search.full_fit.causes;
     let without: Vec<bool> =
-        certain.iter().zip(causes).map(|(sure, cause)| *sure && !is_carried(cause)).collect();
+        certain.iter().zip(causes).map(|(sure, cause)| *sure && !cause.is_in_arm()).collect();
     let plain = of(&without);
     if better(&plain.errors) { found } else { plain }
 }
@@ -456,7 +447,7 @@ fn with_uncertain_causes(
     fit: &Extended,
     discrepancy: Option<&Discrepancy>,
 ) -> Option<Extended> {
-    let all = in_doubt::representable_causes(&search.full_fit.causes, &search.accepted);
+    let all = written_causes(search.full_fit.causes.iter());
     let missing = |cause: &Cause| !contains_cause(&fit.causes, cause);
     all.iter().any(missing).then(|| in_doubt::with_zero_causes(fit, written(search, &all, discrepancy)))
 }

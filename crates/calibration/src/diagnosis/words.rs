@@ -187,6 +187,13 @@ pub fn describe_cause(
             format!("the links grow by {:.1} µm per metre and kelvin", t.growth_per_k * 1e6)
         }
         Cause::Arm(growth @ Effect::ThermalDrift(_)) => drift::describe_growth(&[growth], dataset),
+        Cause::Arm(Effect::AxisWobble(wobble)) => wobbles(joint, wobble.tilt_rad),
+        Cause::Arm(Effect::BaseTilt(tilt)) if tilt.term.iter().any(|term| term.frame.is_some()) => {
+            TILTS_UNDER_UNKNOWN_MASSES.to_owned()
+        }
+        Cause::Arm(Effect::BaseTilt(_)) => {
+            "the base tilts under the overturning moment of the arm".to_owned()
+        }
         Cause::Measurement(d) => describe_disturbance(d, &when(cause.rows()), parameters, (dataset, frames)),
     }
 }
@@ -315,10 +322,7 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
             value.to_degrees()
         ),
         EmpiricalFault::TwoJointGear { other, .. } => depends_on_two(joint, other),
-        EmpiricalFault::AxisWobble { .. } => format!(
-            "the axis of joint {joint} wobbles by up to {:.4}° twice a turn, as in a bearing with races that are not flat",
-            largest_tilt([0, 1, 2, 3].map(|k| value_of(parameters, k))).to_degrees()
-        ),
+        EmpiricalFault::AxisWobble { .. } => wobbles(joint, [0, 1, 2, 3].map(|k| value_of(parameters, k))),
         EmpiricalFault::Refraction => format!(
             "the tracker's beam is refracted: {:.3} mm at 3 m, growing with the square of the distance, as in air with a vertical temperature gradient",
             9e3 * value.abs()
@@ -394,10 +398,7 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
                 about(1)
             )
         }
-        EmpiricalFault::BaseTilt { .. } => {
-            "the base tilts under the overturning moment of the arm, with masses that no data sheet states"
-                .to_owned()
-        }
+        EmpiricalFault::BaseTilt { .. } => TILTS_UNDER_UNKNOWN_MASSES.to_owned(),
     }
 }
 
@@ -408,6 +409,18 @@ fn stiffens(joint: usize, deflection: f64) -> String {
         deflection.to_degrees()
     )
 }
+
+/// Of a joint (from 1) whose axis tilts by these factors (rad).
+fn wobbles(joint: usize, tilt_rad: [f64; 4]) -> String {
+    format!(
+        "the axis of joint {joint} wobbles by up to {:.4}° twice a turn, as in a bearing with races that are not flat",
+        largest_tilt(tilt_rad).to_degrees()
+    )
+}
+
+/// Of a base whose load is not known.
+const TILTS_UNDER_UNKNOWN_MASSES: &str =
+    "the base tilts under the overturning moment of the arm, with masses that no data sheet states";
 
 /// Of a joint (from 1) with another law.
 fn is_nonlinear(joint: usize) -> String {

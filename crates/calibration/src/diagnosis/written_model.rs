@@ -16,31 +16,28 @@ use super::sensor_discrepancy;
 use crate::identification::calibration::CalibrationProblem;
 use crate::identification::prior_width::learn_tolerance;
 use crate::identification::tolerance::Tolerance;
-use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Problem;
 
-/// The causes of a fit for the written model: all causes of the measurement, and those effects of the arm that are `certain`;
-/// for those without a place in a model file what stands in for them.
+/// The causes of a fit for the written model: all causes of the measurement, and those of the arm that are `certain`.
 pub(super) fn certain_causes(extended: &Extended, certain: &[bool]) -> Vec<Cause> {
     let is_certain = |k: usize| certain.get(k) != Some(&false);
     let causes = extended.causes.iter().enumerate();
-    let kept = causes.clone().filter(|&(k, cause)| match cause {
-        Cause::Measurement(_) => !has_no_model_representation(cause),
-        Cause::Arm(_) => is_certain(k),
-    });
-    let mut out: Vec<Cause> = kept.map(|(_, cause)| cause.clone()).collect();
-    for stand_in in causes.filter(|&(k, _)| is_certain(k)).filter_map(|(_, cause)| cause.stand_in()) {
-        if !contains_cause(&out, &stand_in) {
-            out.push(stand_in);
+    let kept = causes.filter(|&(k, cause)| !cause.is_in_arm() || is_certain(k));
+    written_causes(kept.map(|(_, cause)| cause))
+}
+
+/// Causes as a written arm has them, each once.
+pub(super) fn written_causes<'c>(causes: impl Iterator<Item = &'c Cause>) -> Vec<Cause> {
+    // Faults of the arm last, behind the effects.
+    let (faults, others): (Vec<&Cause>, Vec<&Cause>) = causes.partition(|cause| cause.effect().is_some());
+    let mut out: Vec<Cause> = others.into_iter().cloned().collect();
+    for written in faults.into_iter().map(Cause::as_written) {
+        if !contains_cause(&out, &written) {
+            out.push(written);
         }
     }
     out
-}
-
-/// Whether a cause is in the arm but has no representation in a model file.
-pub(super) fn has_no_model_representation(cause: &Cause) -> bool {
-    matches!(cause, Cause::Measurement(d) if matches!(d.kind, Kind::Empirical(form) if form.is_in_arm()))
 }
 
 /// Fits the written model with `causes` under the tolerances of the arm, by default learned from its own rows (with the wide ones of

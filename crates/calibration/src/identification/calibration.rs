@@ -28,3 +28,4 @@ pub use problem::CalibrationProblem;
 pub use regressors::{
     LoadedRows, flange_torques, joint_rotations, sensor_shifts, sensor_turns, torques_under,
 };
+pub use sensor_motion::{Motion, motions_by_links};

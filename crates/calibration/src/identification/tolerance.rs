@@ -5,7 +5,9 @@
 use crate::identification::calibration::Frames;
 use crate::measurement::registration::TARGET_SIGMA_MM;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use crate::measurement::sensor::empirical::{TWO_JOINT_SIGMA_RAD, torque_power_sigma};
+use crate::measurement::sensor::empirical::{
+    TWO_JOINT_SIGMA_RAD, base_tilt_sigma, torque_power_sigma, wobble_sigma,
+};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
@@ -142,6 +144,11 @@ pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
         Effect::GearTwoJoints(_) => TWO_JOINT_SIGMA_RAD,
         Effect::Backlash(_) | Effect::JointStiffness(_) => 0.2_f64.to_radians(),
         Effect::ThermalDrift(_) => GROWTH_SIGMA,
+        Effect::AxisWobble(_) => wobble_sigma(parameter),
+        Effect::BaseTilt(tilt) => {
+            let count = tilt.term.len().max(1);
+            base_tilt_sigma(tilt.term.iter().any(|term| term.frame.is_some()), parameter >= count)
+        }
         Effect::SmoothCorrection(_) => SMOOTH_SIGMA_RAD,
     }
 }

@@ -5,6 +5,7 @@ use super::payload::payload_at;
 use crate::options::Options;
 use crate::plan::MotionOutcome;
 use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::base_tilt::TiltTerm;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::motion::Listing;
 
@@ -23,7 +24,7 @@ pub fn is_other_load(kg: f64, arm: &Estimated) -> bool {
     let measured_kg = arm.condition.payload_kg.unwrap_or(0.0);
     let same_kg = SAME_LOAD * rated_payload_kg(&arm.robot).unwrap_or(measured_kg);
     let effects = || arm.model.effects.iter().filter(|effect| !effect.is_zero());
-    let follows = |joint| effects().any(|effect| effect.needs_torque() && effect.joint() == joint);
+    let follows = |joint| effects().any(|effect| effect.depends_on_load() && effect.joint() == joint);
     let holds_for_one = effects().any(|effect| effect.holds_for_one_load() && !follows(effect.joint()));
     holds_for_one && (kg - measured_kg).abs() > same_kg.max(NO_LOAD_KG)
 }
@@ -47,6 +48,12 @@ fn deflection_mm(kg: f64, arm: &Estimated) -> f64 {
         }
         Effect::LinkBending(e) if e.frame.is_some() => {
             e.compliance_rad_per_nm.abs() * reach_m(e.joint).powi(2)
+        }
+        Effect::BaseTilt(e) => {
+            let lumped = e.term.iter().filter(|term| term.frame.is_some());
+            let of =
+                |term: &TiltTerm| term.tilt_rad_per_nm.abs() * reach_m(0) + term.sway_mm_per_nm.abs() * 1e-3;
+            lumped.map(of).sum::<f64>() * reach_m(0)
         }
         _ => 0.0,
     };

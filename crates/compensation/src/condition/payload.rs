@@ -37,5 +37,5 @@ fn together(a: &Load, b: &Load) -> Load {
 
 /// Whether an effect depends on the payload.
 pub(crate) fn is_load_dependent(effect: &Effect) -> bool {
-    effect.needs_torque() && !effect.is_zero()
+    effect.depends_on_load() && !effect.is_zero()
 }

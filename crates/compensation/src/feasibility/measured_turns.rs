@@ -38,7 +38,9 @@ fn stands_alike_after_a_turn(arm: &Estimated, joint: usize) -> bool {
             | Effect::LinkBending(_)
             | Effect::GearTwoJoints(_)
             | Effect::Backlash(_)
-            | Effect::ThermalDrift(_) => true,
+            | Effect::ThermalDrift(_)
+            | Effect::AxisWobble(_)
+            | Effect::BaseTilt(_) => true,
             Effect::JointCoupling(_) | Effect::SmoothCorrection(_) => false,
             _ => effect.joint() != Some(joint),
         })

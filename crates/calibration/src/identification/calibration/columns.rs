@@ -12,6 +12,7 @@ use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::condition::Condition;
+use truegrind_arm::link_motion::LinkMotion;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_math::lanes::WIDTH;
@@ -87,7 +88,9 @@ pub(super) struct Columns {
     pub(super) extra: Option<[Vec<f64>; 6]>,
     /// Relative growth of the starting model's links; empty without.
     pub(super) growth: Vec<f64>,
-    /// For each free effect parameter: rotations and growth per unit.
+    /// Motion of links by the starting model's effects; absent where none moves any.
+    pub(super) moved: Option<MotionColumns>,
+    /// For each free effect parameter: rotations, growth and motion of links per unit.
     pub(super) effects: Vec<EffectColumns>,
     /// Index into `effects` of each parameter of x; out of range for parameters of no effect.
     pub(super) effect_at: Vec<usize>,
@@ -113,7 +116,12 @@ pub(super) struct EffectColumns {
     pub(super) index: usize,
     pub(super) rotation: [Option<Vec<f64>>; 6],
     pub(super) growth: Option<Vec<f64>>,
+    /// The motion of the target's link. That of the links before it differs by what matters in second order.
+    pub(super) moved: Option<MotionColumns>,
 }
+
+/// Shift at the base's origin (mm), then turn (rad), of the target's link in the base: one column each.
+pub(super) type MotionColumns = [Vec<f64>; 6];
 
 impl Columns {
     /// The given rows, padded likewise.
@@ -124,6 +132,7 @@ impl Columns {
         let picked = |all: &[f64]| -> Vec<f64> {
             if all.is_empty() || n == 0 { Vec::new() } else { (0..padded).map(|i| all[row(i)]).collect() }
         };
+        let motion = |all: &MotionColumns| -> MotionColumns { std::array::from_fn(|k| picked(&all[k])) };
         let vectors = |all: &[Vec<[Vec<f64>; 3]>]| -> Vec<Vec<[Vec<f64>; 3]>> {
             let of = |v: &[Vec<f64>; 3]| std::array::from_fn(|k| picked(&v[k]));
             all.iter().map(|parameters| parameters.iter().map(of).collect()).collect()
@@ -147,6 +156,7 @@ impl Columns {
             },
             extra: self.extra.as_ref().map(|extra| std::array::from_fn(|j| picked(&extra[j]))),
             growth: picked(&self.growth),
+            moved: self.moved.as_ref().map(&motion),
             effects: self
                 .effects
                 .iter()
@@ -154,6 +164,7 @@ impl Columns {
                     index: effect.index,
                     rotation: std::array::from_fn(|j| effect.rotation[j].as_deref().map(&picked)),
                     growth: effect.growth.as_deref().map(&picked),
+                    moved: effect.moved.as_ref().map(&motion),
                 })
                 .collect(),
             effect_at: self.effect_at.clone(),
@@ -268,7 +279,7 @@ impl Columns {
                 }
                 let wanted = Parameter::Disturbance { index, parameter };
                 if let Some(x_index) = parameters.iter().position(|p| *p == wanted) {
-                    self.effects.push(EffectColumns { index: x_index, rotation, growth: None });
+                    self.effects.push(EffectColumns { index: x_index, rotation, ..EffectColumns::default() });
                 }
             }
         }
@@ -312,6 +323,11 @@ impl Columns {
         };
         self.extra = Some(std::array::from_fn(|j| joined(&|part| &part.extra[j])));
         self.growth = joined(&|part| &part.growth);
+        let motion = |of: &dyn Fn(&EffectRows) -> Option<&MotionColumns>| -> Option<MotionColumns> {
+            of(parts.first()?)?;
+            Some(std::array::from_fn(|k| joined(&|part| of(part).map_or(&[], |motion| &motion[k]))))
+        };
+        self.moved = motion(&|part| part.moved.as_ref());
         self.effects = free
             .iter()
             .enumerate()
@@ -319,9 +335,16 @@ impl Columns {
                 index: free.x_index,
                 rotation: std::array::from_fn(|j| spread(&|part| part.effects[k].rotation[j].as_deref())),
                 growth: spread(&|part| part.effects[k].growth.as_deref()),
+                moved: motion(&|part| part.effects[k].moved.as_ref()),
             })
             .collect();
     }
+}
+
+/// Writes the motion of a row.
+fn store(to: &mut MotionColumns, row: usize, motion: &LinkMotion<f64>) {
+    let numbers = motion.shift.iter().chain(&motion.turn);
+    to.iter_mut().zip(numbers).for_each(|(column, number)| column[row] = *number);
 }
 
 /// Rows per parallel chunk.
@@ -341,18 +364,26 @@ struct FreeEffect {
 struct EffectRows {
     extra: [Vec<f64>; 6],
     growth: Vec<f64>,
+    /// In every chunk or in none.
+    moved: Option<MotionColumns>,
     effects: Vec<EffectColumns>,
 }
 
 impl EffectRows {
     fn of(dataset: &Dataset, rows: Range<usize>, start: &Model, free: &[FreeEffect]) -> Self {
         let n = rows.len();
+        let still = || -> MotionColumns { std::array::from_fn(|_| vec![0.0; n]) };
         let mut out = Self {
             extra: std::array::from_fn(|_| vec![0.0; n]),
             growth: vec![0.0; n],
+            moved: start.effects.iter().any(|effect| effect.first_moved_frame().is_some()).then(still),
             effects: free
                 .iter()
-                .map(|free| EffectColumns { index: free.x_index, ..EffectColumns::default() })
+                .map(|free| EffectColumns {
+                    index: free.x_index,
+                    moved: start.effects[free.index].first_moved_frame().map(|_| still()),
+                    ..EffectColumns::default()
+                })
                 .collect(),
         };
         let mut posed = start.at_condition(&Condition::default());
@@ -365,15 +396,22 @@ impl EffectRows {
                 out.extra[j][i] = rotation[j];
             }
             out.growth[i] = start.effects.iter().map(|e| e.growth(&row.condition)).sum();
-            let mut cached = (usize::MAX, Vec::new(), Vec::new());
+            if let Some((to, motion)) = out.moved.as_mut().zip(posed.link_motion(&row.joints)) {
+                store(to, i, &motion);
+            }
+            let mut cached = (usize::MAX, Vec::new(), Vec::new(), Vec::new());
             for (columns, free) in out.effects.iter_mut().zip(free) {
                 if cached.0 != free.index {
                     let growth = start.effects[free.index].growth_regressors(&row.condition);
-                    cached = (free.index, posed.effect_regressors(free.index, &row.joints), growth);
+                    let moved = posed.link_motion_regressors(free.index, &row.joints);
+                    cached = (free.index, posed.effect_regressors(free.index, &row.joints), growth, moved);
                 }
                 let regressor = cached.1[free.parameter];
                 for j in (0..6).filter(|&j| regressor[j] != 0.0) {
                     columns.rotation[j].get_or_insert_with(|| vec![0.0; n])[i] = regressor[j];
+                }
+                if let Some((to, motion)) = columns.moved.as_mut().zip(cached.3.get(free.parameter)) {
+                    store(to, i, motion);
                 }
                 let row_growth = cached.2.get(free.parameter).copied().unwrap_or(0.0);
                 if row_growth != 0.0 {

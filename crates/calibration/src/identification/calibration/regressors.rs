@@ -22,6 +22,9 @@ const HOUR_S: f64 = 3600.0;
 
 /// Rotation of each joint (rad) per unit of each parameter, row by row, of faults that rotate joints.
 fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
+    if !fault.rotates_joints() {
+        return Vec::new();
+    }
     let is_step = matches!(fault, EmpiricalFault::LoadedPlay { .. });
     if let Some(effect) = fault.effect().filter(|_| !is_step) {
         return effect_rotations(&effect, dataset, model);

@@ -6,6 +6,8 @@
 
 use nalgebra::Vector3;
 use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::axis_wobble::AxisWobble;
+use truegrind_arm::effect::base_tilt::{BaseTilt, TiltTerm};
 use truegrind_arm::effect::hardening::Hardening;
 use truegrind_arm::effect::joint_load::PointMass;
 use truegrind_arm::effect::torque_powers::TorquePowers;
@@ -192,6 +194,17 @@ pub fn torque_power_sigma(has_masses: bool, parameter: usize) -> f64 {
 /// Prior of an error that depends on two joints.
 pub const TWO_JOINT_SIGMA_RAD: f64 = 3e-4;
 
+/// Prior of a parameter of an axis that wobbles: the axial run-out of a crossed roller bearing, some 0.02 mm over its diameter of some 150 mm.
+pub fn wobble_sigma(parameter: usize) -> f64 {
+    if parameter < 4 { 1.5e-4 } else { 0.02 }
+}
+
+/// Prior of the tilt of a base, or of its sway: a joint of 1e-5 rad/(N m) on a pedestal as soft as itself, half a metre high; times some 30 kg
+/// where masses are not known.
+pub fn base_tilt_sigma(is_lump: bool, sways: bool) -> f64 {
+    1e-5 * if is_lump { 30.0 } else { 1.0 } * if sways { 500.0 } else { 1.0 }
+}
+
 /// Entries of the matrix that maps the direction of the beam, in the target's frame, to a shift of the target's centre.
 const FIRST: [&str; 8] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy"];
 
@@ -216,7 +229,7 @@ impl EmpiricalFault {
         }
     }
 
-    /// Whether it is a fault of the arm (which no model file can represent yet) and not of the measurement.
+    /// Whether it is a fault of the arm and not of the measurement.
     pub fn is_in_arm(self) -> bool {
         matches!(
             self,
@@ -252,8 +265,8 @@ impl EmpiricalFault {
         )
     }
 
-    /// The effect that a model file has for it, at size 0; `None` of faults in the measurement, and of those that no file can carry. Play that
-    /// a load closes becomes a spring that stiffens at once: a program needs a slope where the fault has a step.
+    /// The effect that a model file has for it, at size 0; `None` of faults in the measurement. Play that a load closes becomes a spring that
+    /// stiffens at once: a program needs a slope where the fault has a step.
     pub fn effect(self) -> Option<Effect> {
         let newton_metres = |milli: u32| f64::from(milli.max(1)) * 1e-3;
         let hardening = |joint: usize, load: AssumedLoad, half_mnm: u32| {
@@ -274,6 +287,29 @@ impl EmpiricalFault {
             EmpiricalFault::LoadedPlay { joint, load, closed_mnm } => hardening(joint, load, closed_mnm),
             EmpiricalFault::TwoJointGear { joint, other, orders } => {
                 Effect::GearTwoJoints(TwoJointGear::still(joint, other, orders))
+            }
+            EmpiricalFault::AxisWobble { joint, radial } => Effect::AxisWobble(AxisWobble {
+                joint,
+                tilt_rad: [0.0; 4],
+                radial_mm: radial.then_some([0.0; 4]),
+            }),
+            EmpiricalFault::BaseTilt { load, axes, deep } => {
+                let frames: &[Option<usize>] = match load {
+                    Overturning::Masses => &[None],
+                    Overturning::Lumps => &[Some(2), Some(4), Some(6)],
+                };
+                let abouts = axes.map_or_else(
+                    || vec![None],
+                    |axes| {
+                        let [a, b] = axes.map(usize::from);
+                        [[a, a], [b, b], [a, b]].map(Some).to_vec()
+                    },
+                );
+                let still =
+                    |about, frame| TiltTerm { frame, about, tilt_rad_per_nm: 0.0, sway_mm_per_nm: 0.0 };
+                let all =
+                    abouts.iter().flat_map(|&about| frames.iter().map(move |&frame| still(about, frame)));
+                Effect::BaseTilt(BaseTilt { deep, term: all.collect() })
             }
             _ => return None,
         })
@@ -379,14 +415,7 @@ impl EmpiricalFault {
             }
             EmpiricalFault::Hardening { .. } | EmpiricalFault::LoadedPlay { .. } => 0.2_f64.to_radians(),
             EmpiricalFault::TwoJointGear { .. } => TWO_JOINT_SIGMA_RAD,
-            // The axial run-out of a crossed roller bearing, some 0.02 mm over its diameter of some 150 mm.
-            EmpiricalFault::AxisWobble { .. } => {
-                if parameter < 4 {
-                    1.5e-4
-                } else {
-                    0.02
-                }
-            }
+            EmpiricalFault::AxisWobble { .. } => wobble_sigma(parameter),
             EmpiricalFault::Refraction => 5e-6,
             EmpiricalFault::Pulley | EmpiricalFault::Drum { .. } => 0.5,
             EmpiricalFault::Range { .. } | EmpiricalFault::CableReversal => 0.2,
@@ -398,11 +427,8 @@ impl EmpiricalFault {
                 let droops = if pole == Pole::Bracket { BRACKET.len() } else { 1 };
                 if parameter < droops { 0.2 } else { 2e-3 }
             }
-            // A joint of 1e-5 rad/(N m) on a pedestal as soft as itself, half a metre high; times some 30 kg.
             EmpiricalFault::BaseTilt { load, deep, .. } => {
-                let sways = deep && 2 * parameter >= self.names().len();
-                let per_load = if load == Overturning::Masses { 1.0 } else { 30.0 };
-                1e-5 * per_load * if sways { 500.0 } else { 1.0 }
+                base_tilt_sigma(load == Overturning::Lumps, deep && 2 * parameter >= self.names().len())
             }
         }
     }

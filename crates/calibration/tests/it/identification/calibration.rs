@@ -1,10 +1,12 @@
 //! The calibration problem: every Jacobian column has a numerical twin, lanes and padding change nothing.
 
-use nalgebra::{DMatrix, Matrix6, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Matrix6, Point3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::axis_wobble::AxisWobble;
+use truegrind_arm::effect::base_tilt::{BaseTilt, TiltTerm};
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::effect::thermal::Thermal;
@@ -59,6 +61,23 @@ fn arm() -> Model {
                 time_constant_h: 1.5,
                 growth_per_k: 1.2e-5,
                 reference_c: 20.0,
+            }),
+            Effect::BaseTilt(BaseTilt {
+                deep: true,
+                term: vec![
+                    TiltTerm { frame: None, about: None, tilt_rad_per_nm: 1e-6, sway_mm_per_nm: 3e-4 },
+                    TiltTerm {
+                        frame: Some(4),
+                        about: Some([0, 1]),
+                        tilt_rad_per_nm: -2e-5,
+                        sway_mm_per_nm: 0.0,
+                    },
+                ],
+            }),
+            Effect::AxisWobble(AxisWobble {
+                joint: 2,
+                tilt_rad: [1e-4, -2e-4, 5e-5, 1e-4],
+                radial_mm: Some([0.02, -0.01, 0.03, 0.01]),
             }),
         ],
     }
@@ -271,6 +290,65 @@ fn every_column_has_a_numerical_twin() {
     }
 }
 
+/// An arm with effects reads as its forward map says, whether its effects are those of the start or added by the fit. What moves links is
+/// then taken at the starting arm: a second-order difference.
+#[test]
+fn effects_read_as_the_forward_map_says() {
+    let actual = arm();
+    let mut still = actual.clone();
+    let list: Vec<Parameter> = (0..still.effects.len())
+        .flat_map(|index| {
+            let count = still.effects[index].parameters().len();
+            (0..count).map(move |parameter| Parameter::Effect { index, parameter })
+        })
+        .collect();
+    let mut added = Vec::new();
+    for effect in &mut still.effects {
+        for (k, parameter) in effect.parameters().into_iter().enumerate() {
+            effect.set(k, 0.0);
+            added.push(parameter.value);
+        }
+    }
+    let target = pose_from_vector(&[10.0, 20.0, 80.0, 0.1, -0.2, 0.05]);
+    for sensor in [Sensor::Cable, Sensor::Position, Sensor::Pose] {
+        let mut data = dataset(sensor, 13, 9);
+        for row in &mut data.rows {
+            let seen = actual.forward(&row.joints, &row.condition) * target;
+            row.anchor = 0;
+            row.reading = match sensor {
+                Sensor::Cable => Reading::Cable(seen.translation.vector.norm()),
+                Sensor::Position => Reading::Position(seen.translation.vector),
+                Sensor::Pose => Reading::Pose(Box::new(seen)),
+            };
+        }
+        let outlets = if sensor == Sensor::Cable { 1 } else { 0 };
+        let frames = Frames { flange_from_target: target, ..Frames::at_origin(outlets) };
+        let weights = [Weight { per_mm: 1.0, per_rad: 100.0 }; 13];
+        let largest = |start: &Model, x: &[f64]| {
+            let problem = CalibrationProblem::new(&data, start, &frames, &list, &[], &weights);
+            let mut out = vec![0.0; problem.rows()];
+            problem.residuals(x, 0..out.len(), &mut out);
+            out.iter().fold(0.0_f64, |most, r| most.max(r.abs()))
+        };
+        let [from_start, from_fit] = [largest(&actual, &vec![0.0; added.len()]), largest(&still, &added)];
+        assert!(largest(&still, &vec![0.0; added.len()]) > 0.1, "the effects are seen");
+        assert!(from_start < 2e-5, "{sensor:?}: {from_start}");
+        assert!(from_fit < 2e-4, "{sensor:?}: {from_fit}");
+    }
+}
+
+/// Moment of gravity on an arm and its load about the origin of its base (N m).
+fn overturning_moment(arm: &Model, row: &Row) -> Vector3<f64> {
+    let newton = arm.gravity * 9.80665e-3;
+    let (mut pose, mut moment) = (Pose::identity(), Vector3::zeros());
+    for (i, (link, body)) in arm.links.iter().zip(arm.bodies.unwrap()).enumerate() {
+        pose *= link.pose(row.joints[i]);
+        moment += (pose * Point3::from(body.centre_mm)).coords.cross(&newton) * body.mass_kg;
+    }
+    let load = pose * arm.flange * Point3::from(row.condition.payload_centre_mm);
+    moment + load.coords.cross(&newton) * row.condition.payload_kg.unwrap_or(0.0)
+}
+
 /// What a target that droops and turns on its pole and a base that turns below its origin do to a reading, worked out without the
 /// regressors, leaves no residual but of second order.
 #[test]
@@ -329,7 +407,7 @@ fn a_drooping_target_a_wobbling_axis_and_a_tilted_base_are_read_as_they_move() {
                     seen = centre * turned(turn) * centre.inverse() * seen;
                 }
                 _ => {
-                    let moment = arm.statics().overturning_moment(&arm.mapped(&row.joints), &row.condition);
+                    let moment = overturning_moment(&arm, row);
                     // About a place 400 mm below.
                     let below = Pose::from_parts((g * 400.0).into(), UnitQuaternion::identity());
                     seen = below * turned(moment * size) * below.inverse() * seen;
@@ -473,7 +551,17 @@ fn normal_equations_are_those_of_residuals_seen_by_the_sensor() {
 #[test]
 fn a_turn_of_base_and_sensor_together_is_not_seen() {
     for sensor in [Sensor::Position, Sensor::Pose] {
-        let problem = task_with(sensor, 13, None);
+        let mut problem = task_with(sensor, 13, None);
+        // The first joint of a base that has tilted turns about another axis, by as much.
+        let upright = |index: usize| arm().effects[index].first_moved_frame().is_none();
+        let mut standing = arm();
+        standing.effects.retain(|effect| effect.first_moved_frame().is_none());
+        assert!((0..standing.effects.len()).all(upright), "those that move links come last");
+        let of_them = |p: &Parameter| !matches!(p, Parameter::Effect { index, .. } if !upright(*index));
+        let list: Vec<Parameter> = problem.free_parameters().iter().copied().filter(of_them).collect();
+        let frames = problem.apply(&vec![0.0; problem.parameters()]).1;
+        let weights = [Weight { per_mm: 2.0, per_rad: 300.0 }; 13];
+        problem = CalibrationProblem::new(&dataset(sensor, 13, 7), &standing, &frames, &list, &[], &weights);
         let x = vec![0.0; problem.parameters()];
         let origin = problem.apply(&x).1.base_from_sensor.translation.vector;
         let moved = Vector3::z().cross(&origin);
@@ -569,7 +657,10 @@ fn residuals_equal_the_plain_forward_map() {
     frames.flange_from_target = pose_from_vector(&[10.0, 20.0, 30.0, 0.01, -0.02, 0.05]);
     let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; 11];
     let problem = CalibrationProblem::new(&data, &arm(), &frames, &list, &[], &weights);
-    let x: Vec<f64> = (0..problem.parameters()).map(|k| 1e-5 * (k as f64 - 10.0)).collect();
+    let moves_links = |p: &Parameter| matches!(*p, Parameter::Effect { index, .. } if arm().effects[index].first_moved_frame().is_some());
+    // Of a base 1e-5 rad/(N m) is as much as a soft joint's.
+    let size = |k: usize| if moves_links(&list[k]) { 1e-7 } else { 1e-5 };
+    let x: Vec<f64> = (0..problem.parameters()).map(|k| size(k) * (k as f64 - 10.0)).collect();
     let (model, frames) = problem.apply(&x);
     let errors = problem.errors_mm(&x);
     for (row, error) in data.rows.iter().zip(errors) {

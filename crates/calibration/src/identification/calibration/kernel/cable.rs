@@ -1,11 +1,14 @@
 //! Rows of a cable's length.
 
-use super::row_geometry::{V, frames, in_base, load, profile, rotates_joints, splat, target_point};
+use super::row_geometry::{
+    RowFrames, V, frames, in_base, load, motion, profile, rotates_joints, splat, target_point,
+};
 use super::state::State;
 use crate::identification::calibration::columns::EffectColumns;
 use crate::identification::calibration::problem::CalibrationProblem;
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::chain::{Chain, cross, dot, minus, scaled};
+use truegrind_arm::link_motion::LinkMotion;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_math::lanes::{Real, SinCos, WIDTH};
 
@@ -44,10 +47,10 @@ fn is_anchor<R: Real>(like: R, problem: &CalibrationProblem, at: usize, anchor: 
     per_anchor(like, problem, at, |a| if a == anchor { 1.0 } else { 0.0 })
 }
 
-/// Column of an effect: the joint rotations and the growth of the links per unit, along the cable.
+/// Column of an effect: the joint rotations, the growth and the motion of the links per unit, along the cable; `p` is the target.
 #[inline(always)]
 fn effect_projection<R: Real>(
-    frames: &Chain<R>,
+    (frames, moved, p): (&Chain<R>, &LinkMotion<R>, &V<R>),
     u: &V<R>,
     moment: &[V<R>; 7],
     effect: &EffectColumns,
@@ -70,6 +73,10 @@ fn effect_projection<R: Real>(
         }
         sum += like.load(growth, at) * grown;
     }
+    if let Some(columns) = &effect.moved {
+        let [v, _] = moved.twist(&motion(like, columns, at), p);
+        sum += dot(&v, u);
+    }
     sum
 }
 
@@ -86,7 +93,7 @@ pub(super) fn cable_rows<R: SinCos>(
     out: &mut [f64],
 ) {
     let weight = like.load(&problem.weights.per_mm, at);
-    let (frames, scale) = frames(like, problem, state, at);
+    let RowFrames { frames, scale, moved } = frames(like, problem, state, at);
     let p = target_point(&frames, state, at);
     let (outlet, zero) = outlet_and_zero(like, problem, state, at);
     let mut v = minus(&p, &outlet);
@@ -143,10 +150,12 @@ pub(super) fn cable_rows<R: SinCos>(
                         Kind::Load { .. } | Kind::JointZero { .. } => none,
                     }
             }
-            Parameter::Effect { .. } | Parameter::Disturbance { .. } => problem
-                .columns
-                .effect_of(k)
-                .map_or(none, |effect| effect_projection(&frames, &u, &moment, effect, &state.links_mm, at)),
+            Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
+                problem.columns.effect_of(k).map_or(none, |effect| {
+                    let arm = (&frames, &moved, &p);
+                    effect_projection(arm, &u, &moment, effect, &state.links_mm, at)
+                })
+            }
             Parameter::SensorFrame(_) | Parameter::Target(_) => none,
         };
         value.store(out, k * rows + row_index);

@@ -3,9 +3,10 @@
 use nalgebra::Vector3;
 
 use super::state::State;
-use crate::identification::calibration::columns::Angles;
+use crate::identification::calibration::columns::{Angles, MotionColumns};
 use crate::identification::calibration::problem::CalibrationProblem;
 use truegrind_arm::chain::{Chain, scaled_chain};
+use truegrind_arm::link_motion::LinkMotion;
 use truegrind_math::lanes::{Real, SinCos, sin_cos, splats};
 
 /// A vector in each row.
@@ -31,14 +32,23 @@ pub(super) fn splat<R: Real>(like: R, v: &Vector3<f64>) -> V<R> {
     splats(like, &[v.x, v.y, v.z])
 }
 
-/// Link frames of the rows, and the thermal scale factor of the links.
+/// Link frames of some rows.
+pub(super) struct RowFrames<R> {
+    pub(super) frames: Chain<R>,
+    /// The thermal scale factor of the links.
+    pub(super) scale: R,
+    /// How effects move the target's link; the frames have moved so.
+    pub(super) moved: LinkMotion<R>,
+}
+
+/// Link frames of the rows.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn frames<R: SinCos>(
     like: R,
     problem: &CalibrationProblem,
     state: &State,
     at: usize,
-) -> (Chain<R>, R) {
+) -> RowFrames<R> {
     let columns = &problem.columns;
     let (mut sin, mut cos) = match &*columns.angles {
         Angles::SinCos { sin, cos } => (six(like, sin, at), six(like, cos, at)),
@@ -69,7 +79,24 @@ pub(super) fn frames<R: SinCos>(
             (sin[j], cos[j]) = (sin[j] * c + cos[j] * s, cos[j] * c - sin[j] * s);
         }
     }
-    (scaled_chain(&state.tables, &sin, &cos, scale), scale)
+    let mut frames = scaled_chain(&state.tables, &sin, &cos, scale);
+    let mut moved = LinkMotion::none(like);
+    if let Some(of_start) = &columns.moved {
+        moved = motion(like, of_start, at);
+        for (effect, value) in columns.effects.iter().zip(&state.effects) {
+            if let Some(of_effect) = &effect.moved {
+                moved.add(like.splat(*value), &motion(like, of_effect, at));
+            }
+        }
+        frames.carry(0, &moved);
+    }
+    RowFrames { frames, scale, moved }
+}
+
+/// A motion of links.
+#[inline(always)]
+pub(super) fn motion<R: Real>(like: R, columns: &MotionColumns, at: usize) -> LinkMotion<R> {
+    LinkMotion { shift: three(like, columns, 0, at), turn: three(like, columns, 3, at) }
 }
 
 #[inline(always)]

@@ -4,13 +4,14 @@ use nalgebra::Vector3;
 
 use super::axes::Axes;
 use super::row_geometry::{
-    V, frames, in_base, load, plus, profile, rotates_joints, splat, target_point, three,
+    RowFrames, V, frames, in_base, load, motion, plus, profile, rotates_joints, splat, target_point, three,
 };
 use super::state::State;
 use crate::identification::calibration::columns::EffectColumns;
 use crate::identification::calibration::problem::CalibrationProblem;
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::chain::{Chain, cross, dot, minus, scaled};
+use truegrind_arm::link_motion::LinkMotion;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_math::lanes::{Real, SinCos};
 
@@ -85,10 +86,10 @@ fn times<R: Real>(columns: &[V<R>; 3], v: &V<R>) -> V<R> {
     out
 }
 
-/// Twist of the target per unit of an effect: the joint rotations and the growth of the links.
+/// Twist of the target per unit of an effect: the joint rotations, the growth and the motion of the links.
 #[inline(always)]
 fn effect_twist<R: Real>(
-    frames: &Chain<R>,
+    (frames, moved): (&Chain<R>, &LinkMotion<R>),
     p: &V<R>,
     effect: &EffectColumns,
     links_mm: &[(f64, f64); 6],
@@ -111,6 +112,10 @@ fn effect_twist<R: Real>(
             let up = link_twist(frames, p, joint, LinkCoordinate::D);
             add(&mut sum, grown * like.splat(*d), &up);
         }
+    }
+    if let Some(columns) = &effect.moved {
+        let [v, w] = moved.twist(&motion(like, columns, at), p);
+        add(&mut sum, like.splat(1.0), &(v, w));
     }
     sum
 }
@@ -173,6 +178,8 @@ struct Compared<R> {
     frames: Chain<R>,
     /// Thermal scale factor of the links.
     scale: R,
+    /// How effects move the target's link; the frames have moved so.
+    moved: LinkMotion<R>,
     target: V<R>,
     /// Axes of the sensor, undisturbed.
     sensor: [V<R>; 3],
@@ -188,7 +195,7 @@ struct Compared<R> {
 }
 
 /// What a unit of a parameter moves.
-struct Moved<R> {
+struct Change<R> {
     twist: Twist<R>,
     /// Sensor frame parameters move the reading; all others move the arm's prediction.
     sensor_side: bool,
@@ -201,7 +208,7 @@ struct Moved<R> {
 impl<R: SinCos> Compared<R> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn of(like: R, problem: &CalibrationProblem, state: &State, at: usize) -> Self {
-        let (frames, scale) = frames(like, problem, state, at);
+        let RowFrames { frames, scale, moved } = frames(like, problem, state, at);
         let target = target_point(&frames, state, at);
         let rotation = state.base_from_sensor.rotation.to_rotation_matrix();
         let sensor = [0, 1, 2].map(|k| splat(like, &rotation.matrix().column(k).into()));
@@ -215,22 +222,22 @@ impl<R: SinCos> Compared<R> {
             origin = plus(&origin, &load(like, &disturbed.frame, at));
         }
         let from_sensor = minus(&target, &origin);
-        Self { frames, scale, target, sensor, turn, measured, from_sensor, gain }
+        Self { frames, scale, moved, target, sensor, turn, measured, from_sensor, gain }
     }
 
     /// Motion per unit of parameter `k`.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn moved(
+    fn change(
         &self,
         problem: &CalibrationProblem,
         state: &State,
         k: usize,
         axes: Axes,
         at: usize,
-    ) -> Moved<R> {
+    ) -> Change<R> {
         let (like, frames) = (self.gain, &self.frames);
         let none = [like.splat(0.0); 3];
-        let of_arm = |twist| Moved { twist, sensor_side: false, turns_axes: false, is_scaled: true };
+        let of_arm = |twist| Change { twist, sensor_side: false, turns_axes: false, is_scaled: true };
         match problem.parameters[k] {
             Parameter::Link { joint, coordinate } if coordinate.is_length() => {
                 let (v, w) = link_twist(frames, &self.target, joint, coordinate);
@@ -247,7 +254,7 @@ impl<R: SinCos> Compared<R> {
             }
             Parameter::SensorFrame(axis) if axis < 3 => {
                 let twist = (splat(like, &Vector3::ith(axis, 1.0)), none);
-                Moved { twist, sensor_side: true, turns_axes: false, is_scaled: true }
+                Change { twist, sensor_side: true, turns_axes: false, is_scaled: true }
             }
             Parameter::SensorFrame(axis) => {
                 let w = splat(like, &state.sensor_axes.column(axis - 3).into());
@@ -257,13 +264,14 @@ impl<R: SinCos> Compared<R> {
                     // With r = measured − modelled, ω × measured − ω × r.
                     Axes::Sensor => (cross(&w, &scaled(self.gain, &self.from_sensor)), true),
                 };
-                Moved { twist: (v, w), sensor_side: true, turns_axes, is_scaled: false }
+                Change { twist: (v, w), sensor_side: true, turns_axes, is_scaled: false }
             }
             Parameter::Disturbance { index, parameter } if !rotates_joints(problem, index) => {
                 self.disturbed(problem, state, (index, parameter), at)
             }
             Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
-                let of = |effect| effect_twist(frames, &self.target, effect, &state.links_mm, at);
+                let of =
+                    |effect| effect_twist((frames, &self.moved), &self.target, effect, &state.links_mm, at);
                 of_arm(problem.columns.effect_of(k).map_or((none, none), of))
             }
             Parameter::Outlet { .. } | Parameter::Zero { .. } => of_arm((none, none)),
@@ -278,7 +286,7 @@ impl<R: SinCos> Compared<R> {
         state: &State,
         (index, parameter): (usize, usize),
         at: usize,
-    ) -> Moved<R> {
+    ) -> Change<R> {
         let (like, columns) = (self.gain, &problem.columns);
         let none = [like.splat(0.0); 3];
         let amplitude = profile(like, problem, index, at);
@@ -310,7 +318,7 @@ impl<R: SinCos> Compared<R> {
             Kind::Zero | Kind::Sag | Kind::Load { .. } | Kind::JointZero { .. } => (none, none),
         };
         let twist = (scaled(amplitude, &v), scaled(amplitude, &w));
-        Moved { twist, sensor_side, turns_axes: false, is_scaled }
+        Change { twist, sensor_side, turns_axes: false, is_scaled }
     }
 }
 
@@ -349,7 +357,8 @@ pub(super) fn spatial_rows<R: SinCos>(
     }
     let Some(axes) = jacobian else { return };
     for k in 0..problem.parameters.len() {
-        let Moved { twist, sensor_side, turns_axes, is_scaled } = compared.moved(problem, state, k, axes, at);
+        let Change { twist, sensor_side, turns_axes, is_scaled } =
+            compared.change(problem, state, k, axes, at);
         let size = if is_scaled { weight * compared.gain } else { weight };
         let sign = if sensor_side { size } else { -size };
         for (i, v) in twist.0.into_iter().enumerate() {
