@@ -1,8 +1,8 @@
 //! The arm of the test: what the controller believes (the data sheet) and what stands in the cell (the actual arm).
 //!
 //! Both are chains of links Rot_z(θ) Trans(a, 0, d) Rot_x(α) Rot_y(β). The actual arm has other numbers, joints that
-//! yield under the torque of gravity on links and payload, and joints with play, whose links stay where they are until a
-//! flank takes them along ([`play`](crate::play)). The controller's inverse is the closed form of an arm with a spherical wrist.
+//! yield under the torque of gravity on links and payload, a base that tilts under it, an axis that wobbles, and joints with play, whose links
+//! stay where they are until a flank takes them along ([`play`](crate::play)). The controller's inverse is the closed form of an arm with a spherical wrist.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -74,6 +74,19 @@ pub struct Arm {
     pub compliance: [f64; 6],
     /// Play of each joint (rad).
     pub play: [f64; 6],
+    /// What the base tilts (rad per N m).
+    pub soft_base: f64,
+    /// An axis that wobbles twice a turn.
+    pub wobble: Option<Wobble>,
+}
+
+/// An axis that wobbles twice a turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wobble {
+    /// The joint.
+    pub joint: usize,
+    /// Tilt about x with the cosine and the sine of twice the angle, then about y (rad).
+    pub tilt: [f64; 4],
 }
 
 fn step(link: &Link, angle: f64) -> Pose {
@@ -102,19 +115,50 @@ impl Arm {
         let yields = self.compliance.iter().any(|c| *c != 0.0);
         let torque = if yields { self.torques(q, circumstance) } else { [0.0; 6] };
         let axes = self.map.axes(q);
-        let angles =
-            std::array::from_fn(|j| axes[j] + self.compliance[j] * torque[j] + circumstance.behind[j]);
-        frames(&self.actual, &angles)[6]
+        let mut pose = self.base(q, circumstance);
+        for j in 0..6 {
+            let angle = axes[j] + self.compliance[j] * torque[j] + circumstance.behind[j];
+            if let Some(wobble) = self.wobble.filter(|wobble| wobble.joint == j) {
+                // Of axes that stand still: where the link stands at the angle 0.
+                let x =
+                    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.actual[j].theta) * Vector3::x();
+                let ((sin, cos), [a, b, c, d]) = ((2.0 * angle).sin_cos(), wobble.tilt);
+                let turn = x * (a * cos + b * sin) + Vector3::z().cross(&x) * (c * cos + d * sin);
+                pose *= Pose::from_parts(Translation3::identity(), UnitQuaternion::from_scaled_axis(turn));
+            }
+            pose *= step(&self.actual[j], angle);
+        }
+        pose
+    }
+
+    /// Where the base stands under the moment of gravity about its origin.
+    fn base(&self, q: &[f64; 6], circumstance: &Circumstance) -> Pose {
+        if self.soft_base == 0.0 {
+            return Pose::identity();
+        }
+        let weights = self.weights(&frames(&self.actual, &self.map.axes(q)), circumstance);
+        let moment: Vector3<f64> = weights
+            .iter()
+            .map(|(_, kg, centre)| centre.coords.cross(&Vector3::new(0.0, 0.0, -WEIGHT * kg)))
+            .sum();
+        let turn = UnitQuaternion::from_scaled_axis(moment * self.soft_base);
+        Pose::from_parts(Translation3::identity(), turn)
+    }
+
+    /// What gravity pulls at: the link that carries it, its mass (kg) and its centre.
+    fn weights(&self, at: &[Pose; 7], circumstance: &Circumstance) -> Vec<(usize, f64, Point3<f64>)> {
+        let mut weights = Vec::new();
+        for (j, mass) in self.masses.iter().flatten().enumerate() {
+            weights.push((j, mass.kg, at[j + 1] * Point3::from(mass.centre)));
+        }
+        weights.push((5, circumstance.payload_kg, at[6] * Point3::from(circumstance.payload_centre_mm)));
+        weights
     }
 
     /// Torque of gravity about each axis (N m).
     pub fn torques(&self, q: &[f64; 6], circumstance: &Circumstance) -> [f64; 6] {
         let at = frames(&self.actual, &self.map.axes(q));
-        let mut weights: Vec<(usize, f64, Point3<f64>)> = Vec::new();
-        for (j, mass) in self.masses.iter().flatten().enumerate() {
-            weights.push((j, mass.kg, at[j + 1] * Point3::from(mass.centre)));
-        }
-        weights.push((5, circumstance.payload_kg, at[6] * Point3::from(circumstance.payload_centre_mm)));
+        let weights = self.weights(&at, circumstance);
         std::array::from_fn(|j| {
             let (axis, origin) = (at[j].rotation * Vector3::z(), at[j].translation.vector);
             let carried = weights.iter().filter(|(link, ..)| *link >= j);

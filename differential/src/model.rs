@@ -7,7 +7,7 @@ use std::fmt::Write;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::arm::{Arm, Link, Mass};
+use crate::arm::{Arm, Link, Mass, Wobble};
 use crate::joint_map::JointMap;
 
 /// A robot of the test.
@@ -83,7 +83,20 @@ pub fn random(seed: u64) -> Case {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x61726d);
     let play = rng.random_bool(0.4);
     let load = rng.random_bool(0.4);
-    made(&mut rng, play, load, JointMap::PLAIN)
+    made(&mut rng, play, load, JointMap::PLAIN, |arm| arm)
+}
+
+/// The same arm on a soft base, half of the time, with an axis that wobbles.
+pub fn loose(seed: u64) -> Case {
+    let mut own = ChaCha8Rng::seed_from_u64(seed ^ 0x6c_6f6f_7365);
+    let soft_base = if own.random_bool(0.5) { own.random_range(0.1..1.0) * 1e-6 } else { 0.0 };
+    let joint = own.random_range(0..6);
+    let tilt = std::array::from_fn(|_| own.random_range(-1.0..1.0) * 2e-4);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x61726d);
+    let play = rng.random_bool(0.4);
+    let load = rng.random_bool(0.4);
+    let wobble = Some(Wobble { joint, tilt });
+    made(&mut rng, play, load, JointMap::PLAIN, |arm| Arm { soft_base, wobble, ..arm })
 }
 
 /// The same arm with a controller that counts some joints the other way round, and half of the time the third from the horizontal.
@@ -94,15 +107,15 @@ pub fn mapped(seed: u64) -> Case {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x61726d);
     let play = rng.random_bool(0.4);
     let load = rng.random_bool(0.4);
-    made(&mut rng, play, load, JointMap { sign, coupling })
+    made(&mut rng, play, load, JointMap { sign, coupling }, |arm| arm)
 }
 
 /// A random arm, with or without play and load.
 pub fn with(seed: u64, play: bool, load: bool) -> Case {
-    made(&mut ChaCha8Rng::seed_from_u64(seed ^ 0x61726d), play, load, JointMap::PLAIN)
+    made(&mut ChaCha8Rng::seed_from_u64(seed ^ 0x61726d), play, load, JointMap::PLAIN, |arm| arm)
 }
 
-fn made(rng: &mut ChaCha8Rng, play: bool, load: bool, map: JointMap) -> Case {
+fn made(rng: &mut ChaCha8Rng, play: bool, load: bool, map: JointMap, loosened: impl Fn(Arm) -> Arm) -> Case {
     let mut all = sheets();
     let sheet = &mut all[rng.random_range(0..3)];
     let elbow = [sheet.min_deg[2], sheet.max_deg[2]].map(f64::to_radians);
@@ -149,7 +162,10 @@ fn made(rng: &mut ChaCha8Rng, play: bool, load: bool, map: JointMap) -> Case {
         masses: sheet.masses.take(),
         compliance: joints(load, 1e-4 / stiff),
         play: joints(play, 8e-4),
+        soft_base: 0.0,
+        wobble: None,
     };
+    let arm = loosened(arm);
     let model_toml = toml(&arm, sheet);
     let whole_cuts = rng.random_bool(0.25);
     let start_toml = match map == JointMap::PLAIN {
@@ -201,6 +217,19 @@ fn toml(arm: &Arm, sheet: &Sheet) -> String {
                 arm.play[joint]
             );
         }
+    }
+    if arm.soft_base != 0.0 {
+        let _ = write!(
+            out,
+            "\n[[estimated.effect]]\neffect = \"base-tilt\"\nterm = [{{ tilt_rad_per_nm = {:?} }}]\n",
+            arm.soft_base
+        );
+    }
+    if let Some(Wobble { joint, tilt }) = arm.wobble {
+        let _ = write!(
+            out,
+            "\n[[estimated.effect]]\neffect = \"axis-wobble\"\njoint = {joint}\ntilt_rad = {tilt:?}\n"
+        );
     }
     parameters(&mut out, arm);
     out

@@ -1,17 +1,19 @@
 //! Small rigid motions of a part of the arm against the rest: a base that tilts, an axis that wobbles in its bearing.
 //!
-//! A point at p in the base comes to v + R(ω) p, v the displacement of what is at the base's origin, ω the turn. R is the rotation of
-//! Cayley, tan(angle/2) = |ω|/2: exactly orthogonal without sine or cosine, and for a milliradian the rotation by ω to 1e-10 rad.
+//! A point p comes to o + v + R(ω) (p − o), all in the base: o the point about which the part turns, v its displacement, ω the turn. R is the
+//! rotation of Cayley, tan(angle/2) = |ω|/2: exactly orthogonal without sine or cosine, and for a milliradian the rotation by ω to 1e-10 rad.
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector6;
 
-use super::chain::{Chain, cross, dot};
+use super::chain::{Chain, cross, dot, minus};
 use truegrind_math::lanes::Real;
 
 /// Such a motion, or its derivative with respect to one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkMotion<R> {
-    /// Displacement of what is at the base's origin (mm).
+    /// The point about which it turns (mm).
+    pub about: [R; 3],
+    /// Displacement of that point (mm).
     pub shift: [R; 3],
     /// Turn (rad).
     pub turn: [R; 3],
@@ -22,10 +24,10 @@ impl<R: Real> LinkMotion<R> {
     #[inline(always)]
     pub fn none(like: R) -> Self {
         let zero = [like.splat(0.0); 3];
-        Self { shift: zero, turn: zero }
+        Self { about: zero, shift: zero, turn: zero }
     }
 
-    /// Adds a multiple of another.
+    /// Adds a multiple of another, about the same point.
     #[inline(always)]
     pub fn add(&mut self, by: R, other: &Self) {
         for k in 0..3 {
@@ -48,11 +50,11 @@ impl<R: Real> LinkMotion<R> {
     /// Where a point comes to.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn moved(&self, point: &[R; 3]) -> [R; 3] {
-        let turned = self.turned(point);
-        [0, 1, 2].map(|k| turned[k] + self.shift[k])
+        let turned = self.turned(&minus(point, &self.about));
+        [0, 1, 2].map(|k| self.about[k] + turned[k] + self.shift[k])
     }
 
-    /// Velocity and angular velocity of a point that has come to `point`, where the motion changes by `change`: the turn by
+    /// Velocity and angular velocity of a point that has come to `point`, where the motion changes by `change` about the same point: the turn by
     /// (δω + ω × δω / 2) / (1 + |ω|²/4).
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn twist(&self, change: &Self, point: &[R; 3]) -> [[R; 3]; 2] {
@@ -60,7 +62,8 @@ impl<R: Real> LinkMotion<R> {
         let factor = one / (one + half * half * dot(&self.turn, &self.turn));
         let beside = cross(&self.turn, &change.turn);
         let turn = [0, 1, 2].map(|k| factor * (change.turn[k] + half * beside[k]));
-        let around = cross(&turn, &[0, 1, 2].map(|k| point[k] - self.shift[k]));
+        let lever = [0, 1, 2].map(|k| point[k] - self.about[k] - self.shift[k]);
+        let around = cross(&turn, &lever);
         [[0, 1, 2].map(|k| change.shift[k] + around[k]), turn]
     }
 }
@@ -72,9 +75,10 @@ impl LinkMotion<f64> {
         Vector6::new(v[0], v[1], v[2], w[0], w[1], w[2])
     }
 
-    /// A turn about an axis through a point.
-    pub fn about(point: &Vector3<f64>, turn: &Vector3<f64>) -> Self {
-        Self { shift: point.cross(turn).into(), turn: (*turn).into() }
+    /// The same about the base's origin, to first order.
+    pub fn about_base(&self) -> Self {
+        let moved = cross(&self.about, &self.turn);
+        Self { about: [0.0; 3], shift: [0, 1, 2].map(|k| self.shift[k] + moved[k]), turn: self.turn }
     }
 }
 

@@ -309,7 +309,7 @@ impl PreparedModel<'_> {
         }
     }
 
-    /// Motions of links per unit of each parameter of effect `index`; empty of an effect that moves none.
+    /// Motions of links per unit of each parameter of effect `index`, about the base's origin; empty of an effect that moves none.
     pub fn link_motion_regressors(&self, index: usize, q: &Joints) -> Vec<LinkMotion<f64>> {
         let (Some(statics), Some(effect)) = (&self.statics, self.model.effects.get(index)) else {
             return Vec::new();
@@ -317,14 +317,16 @@ impl PreparedModel<'_> {
         let mapped = self.model.mapped(q);
         let rotations = self.apply_effects(&mapped.into());
         let frames = chain::chain(&self.tables, &rotations.map(f64::sin), &rotations.map(f64::cos));
-        effect.link_motion_regressors(statics, (&mapped, &rotations.into()), &self.of_effects, &frames)
+        let angles = (&mapped, &rotations.into());
+        let all = effect.link_motion_regressors(statics, angles, &self.of_effects, &frames);
+        all.iter().map(LinkMotion::about_base).collect()
     }
 
-    /// The motion of links by all effects together, small as they are.
+    /// The motion of links by all effects together, to first order and about the base's origin.
     pub fn link_motion(&self, q: &Joints) -> Option<LinkMotion<f64>> {
         let mut out = LinkMotion::none(0.0);
         let moved = self.link_motions(q);
-        moved.iter().for_each(|moved| out.add(1.0, &moved.motion));
+        moved.iter().for_each(|moved| out.add(1.0, &moved.motion.about_base()));
         (!moved.is_empty()).then_some(out)
     }
 

@@ -26,18 +26,24 @@ pub struct Features {
     pub placed: bool,
     /// Controllers that count joints the other way round or from the horizontal.
     pub mapped: bool,
+    /// Arms on a base that tilts and with an axis that wobbles.
+    pub loose: bool,
 }
 
 impl Features {
     /// Everything but what came later: a seed stands for the same program as ever.
     pub const ALL: Features =
-        Features { effects: true, taught: true, borders: true, placed: false, mapped: false };
+        Features { effects: true, taught: true, borders: true, placed: false, mapped: false, loose: false };
     /// The same with displacements from where the robot stands.
     pub const MORE: Features = Features { placed: true, ..Features::ALL };
 
     /// The arm of a seed.
     pub fn arm(&self, seed: u64) -> Case {
-        if self.mapped { model::mapped(seed) } else { model::random(seed) }
+        match self {
+            Self { mapped: true, .. } => model::mapped(seed),
+            Self { loose: true, .. } => model::loose(seed),
+            _ => model::random(seed),
+        }
     }
 }
 

@@ -87,8 +87,8 @@ impl AxisWobble {
         let directions = [times(cos, &x), times(sin, &x), times(cos, &y), times(sin, &y)];
         let mut out = [LinkMotion::none(sin); 8];
         for (k, direction) in directions.into_iter().enumerate() {
-            out[k] = LinkMotion { shift: cross(origin, &direction), turn: direction };
-            out[4 + k] = LinkMotion { shift: direction, turn: zero };
+            out[k] = LinkMotion { about: *origin, shift: zero, turn: direction };
+            out[4 + k] = LinkMotion { about: *origin, shift: direction, turn: zero };
         }
         out
     }
@@ -107,7 +107,7 @@ impl AxisWobble {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn sum<R: Real>(&self, motions: [LinkMotion<R>; 8]) -> LinkMotion<R> {
         let like = motions[0].turn[0];
-        let mut out = LinkMotion::none(like);
+        let mut out = LinkMotion { about: motions[0].about, ..LinkMotion::none(like) };
         let radial = self.radial_mm.unwrap_or_default();
         for (motion, size) in motions.iter().zip(self.tilt_rad.iter().chain(&radial)) {
             out.add(like.splat(*size), motion);

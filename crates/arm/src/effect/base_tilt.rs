@@ -138,10 +138,10 @@ impl BaseTilt {
     /// Motion of the base by a turn, and by the sway of a turn.
     #[inline(always)]
     fn motions<R: Real>(turn: &[R; 3], statics: &Statics) -> [LinkMotion<R>; 2] {
-        let zero = [turn[0].splat(0.0); 3];
         let gravity = splats(turn[0], &statics.gravity());
         let sway = cross(&gravity, turn);
-        [LinkMotion { shift: zero, turn: *turn }, LinkMotion { shift: sway, turn: zero }]
+        let still = LinkMotion::none(turn[0]);
+        [LinkMotion { turn: *turn, ..still }, LinkMotion { shift: sway, ..still }]
     }
 
     /// The motion of the arm on its base at mapped angles `u`.

@@ -84,8 +84,7 @@ fn an_axis_wobbles_about_the_origin_of_its_frame() {
                 pose *= link.pose(angle);
             }
             let error = difference(&worn.forward(&q, &still), &(pose * arm.flange));
-            // The displacement by a turn is taken to first order: half its square over the distance from the base is left.
-            assert!(error.fixed_rows::<3>(0).amax() < 5e-7 * 2000.0, "{}: {error}", SHEETS[sheet].name);
+            assert!(error.fixed_rows::<3>(0).amax() < 1e-8, "{}: {error}", SHEETS[sheet].name);
             assert!(error.fixed_rows::<3>(3).amax() < 1e-9, "{}: {error}", SHEETS[sheet].name);
         }
     }

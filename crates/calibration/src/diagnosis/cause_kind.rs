@@ -56,7 +56,8 @@ kinds! {
     /// An axis that wobbles twice a turn.
     AxisWobble = "axis-wobble",
         pattern: "the residual tilts about the axis of joint {joint} twice in a turn of it",
-        remedy: "inspect the bearing of this joint with a dial gauge, axially, over a whole turn; the written model leaves it out";
+        remedy: "inspect the bearing of this joint with a dial gauge, axially, over a whole turn; after a repair measure again, since the \
+            written model corrects for it";
     /// Lost motion where a joint reverses.
     Backlash = "backlash",
         pattern: "the residual about joint {joint} changes sign with the approach side",
@@ -64,8 +65,8 @@ kinds! {
     /// A base that tilts under the overturning moment of the arm.
     BaseTilt = "base-tilt",
         pattern: "the residual turns about the base with the overturning moment of the arm",
-        remedy: "bolt or grout the pedestal, and read a level on it with the arm stretched out and folded; the written model \
-            contains only the part that looks like compliance of joint 2, so measure again afterwards";
+        remedy: "bolt or grout the pedestal, and read a level on it with the arm stretched out and folded; measure again \
+            afterwards, since the written model corrects for the tilt";
     /// A drum wound in layers.
     CableDrum = "cable-drum",
         pattern: "the residual follows powers of the cable's length",

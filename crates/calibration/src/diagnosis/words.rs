@@ -493,6 +493,10 @@ pub(super) fn remedy_left_out(effect: CauseKind, uncertain: bool) -> String {
         }
         JointStiffness => "measure this joint with and without load, approached under the same torque",
         Backlash => "approach every point from the same side",
+        AxisWobble => "inspect the bearing of this joint with a dial gauge, axially, over a whole turn",
+        BaseTilt => {
+            "bolt or grout the pedestal, and read a level on it with the arm stretched out and folded"
+        }
         SmoothCorrection => return left,
         _ => effect.remedy(),
     };

@@ -120,7 +120,7 @@ pub(super) struct EffectColumns {
     pub(super) moved: Option<MotionColumns>,
 }
 
-/// Shift at the base's origin (mm), then turn (rad), of the target's link in the base: one column each.
+/// Shift (mm), then turn (rad), of the target's link about the base's origin: one column each.
 pub(super) type MotionColumns = [Vec<f64>; 6];
 
 impl Columns {

@@ -96,7 +96,8 @@ pub(super) fn frames<R: SinCos>(
 /// A motion of links.
 #[inline(always)]
 pub(super) fn motion<R: Real>(like: R, columns: &MotionColumns, at: usize) -> LinkMotion<R> {
-    LinkMotion { shift: three(like, columns, 0, at), turn: three(like, columns, 3, at) }
+    let (shift, turn) = (three(like, columns, 0, at), three(like, columns, 3, at));
+    LinkMotion { shift, turn, ..LinkMotion::none(like) }
 }
 
 #[inline(always)]
