@@ -22,7 +22,7 @@
 //!     (`confounding`); `unexplained`: the rest, with what a planner needs of it
 //!     ([`something_else`]); [`decision`]: shares of causes that cannot be told apart, and the measurement that decides. `written_model`: the arm for compensation, fitted beside the
 //!     unknown rest of a sensor's law (`sensor_discrepancy`); `in_doubt`: its covariance for uncertain
-//!     causes; `sensor_causes`: whether causes of the measurement are fitted with it.
+//!     causes, `law_error` for laws of which only the form is assumed; `sensor_causes`: whether causes of the measurement are fitted with it.
 //! 11. [`finding`], `summary` and [`words`]: the result, as a contract for programs and as sentences for technicians.
 //!
 //! `algebra` has products and factors of large matrices, `products` and `pure_products` those of a linearised fit with many candidates.
@@ -49,6 +49,7 @@ mod joint_scatter;
 mod unexplained;
 mod written_model;
 mod in_doubt;
+mod law_error;
 mod sensor_causes;
 mod sensor_discrepancy;
 mod contract;

@@ -5,6 +5,7 @@ use super::discrepancy::Discrepancy;
 use super::extension::Extended;
 use super::in_doubt;
 use super::joint_scatter::JointScatter;
+use super::law_error;
 use super::link_geometry::LINK_Z;
 use super::options::Options;
 use super::search::{Search, SearchContext};
@@ -206,6 +207,7 @@ impl Handover<'_> {
         if let Some(left_out) = arm.left_out {
             add_shift(&mut handed, arm.fitted, &left_out.fit);
         }
+        law_error::add_law_errors(&mut handed);
         let (fitted, handed) = (&fitted, &handed);
         let beyond_noise = self.beyond_noise_of(arm);
         let mut estimated = self.without_verdict(fitted, handed, arm.errors, beyond_noise);

@@ -174,6 +174,18 @@ fn an_error_of_two_joints_is_corrected() {
     let found = diagnosed_from(&arm, &actual);
     let gear = found.diagnosis.findings.iter().find(|f| f.effect == "gear-two-joints").unwrap();
     assert_eq!((gear.joints.as_deref(), gear.corrected), (Some(&[1, 2][..]), Some(true)));
+    // The form of such a law is assumed: along what was found its size is known to a twentieth at best, whatever the rows say.
+    let of_it = |p: &Parameter| matches!(p, Parameter::Effect { index: 0, .. });
+    let places: Vec<usize> =
+        (0..found.estimated.order.len()).filter(|&k| of_it(&found.estimated.order[k])).collect();
+    let size =
+        DVector::from_iterator(places.len(), places.iter().map(|&k| found.estimated.parameters[k].value));
+    let own = DMatrix::from_fn(places.len(), places.len(), |a, b| {
+        found.estimated.covariance[(places[a], places[b])]
+    });
+    let share = (size.transpose() * own * &size)[0].sqrt() / size.norm_squared();
+    assert!(share > 0.05 && share < 0.08, "{share}");
+    assert!(gear.parameters.iter().all(|p| p.sigma.unwrap() < 0.03 * size.norm()), "{:?}", gear.parameters);
     let z = errors_in_sigma(&found.estimated, &actual);
     assert!(z < 1.25, "{z}");
     let off = |q: &Joints| {
