@@ -84,7 +84,11 @@ impl PreparedModel<'_> {
         let rows = joints.len();
         out.resize(rows);
         let flange = self.flange_columns();
-        vectorised(Forward { arm: self, flange, joints, out });
+        if self.moves_links() {
+            vectorised(Forward::<true> { arm: self, flange, joints, out });
+        } else {
+            vectorised(Forward::<false> { arm: self, flange, joints, out });
+        }
     }
 
     /// Poses of the flange for many joint vectors.
@@ -109,7 +113,12 @@ impl PreparedModel<'_> {
         let mut out = Vec::with_capacity(joints.len());
         for block in joints.chunks(WIDTH) {
             let joints = std::array::from_fn(|j| std::array::from_fn(|k| block[k.min(block.len() - 1)][j]));
-            let poses = vectorised(ForwardBlock { arm: self, flange: &flange, joints });
+            let flange = &flange;
+            let poses = if self.moves_links() {
+                vectorised(ForwardBlock::<true> { arm: self, flange, joints })
+            } else {
+                vectorised(ForwardBlock::<false> { arm: self, flange, joints })
+            };
             out.extend((0..block.len()).map(|k| {
                 let position = nalgebra::Vector3::from_fn(|i, _| poses.origin[i][k]);
                 let matrix = nalgebra::Matrix3::from_fn(|i, j| poses.axes[j][i][k]);
@@ -131,14 +140,14 @@ impl PreparedModel<'_> {
 }
 
 /// [`PreparedModel::forward_columns`], its buffers of the right size; no flange where it is the last frame.
-struct Forward<'a> {
+struct Forward<'a, const MOVES: bool> {
     arm: &'a PreparedModel<'a>,
     flange: Option<FrameColumns<f64>>,
     joints: &'a JointColumns,
     out: &'a mut PoseColumns,
 }
 
-impl AnyWidth for Forward<'_> {
+impl<const MOVES: bool> AnyWidth for Forward<'_, MOVES> {
     type Output = ();
 
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -158,7 +167,7 @@ impl AnyWidth for Forward<'_> {
             if following < rows {
                 next = angles(like, joints, following);
             }
-            let end = flange_frame(arm, &flange, &angle);
+            let end = flange_frame::<R, MOVES>(arm, &flange, &angle);
             for k in 0..3 {
                 end.origin[k].store(&mut out.position_mm[k], from);
                 for j in 0..3 {
@@ -174,13 +183,13 @@ impl AnyWidth for Forward<'_> {
 type Eight = [f64; WIDTH];
 
 /// [`PreparedModel::forward_many`] of eight rows.
-struct ForwardBlock<'a> {
+struct ForwardBlock<'a, const MOVES: bool> {
     arm: &'a PreparedModel<'a>,
     flange: &'a Option<FrameColumns<f64>>,
     joints: [Eight; 6],
 }
 
-impl AnyWidth for ForwardBlock<'_> {
+impl<const MOVES: bool> AnyWidth for ForwardBlock<'_, MOVES> {
     type Output = FrameColumns<Eight>;
 
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -191,7 +200,7 @@ impl AnyWidth for ForwardBlock<'_> {
             for j in 0..6 {
                 angle[j] = like.load(&self.joints[j], from);
             }
-            let end = flange_frame(self.arm, self.flange, &angle);
+            let end = flange_frame::<R, MOVES>(self.arm, self.flange, &angle);
             for k in 0..3 {
                 end.origin[k].store(&mut out.origin[k], from);
                 for j in 0..3 {
@@ -205,12 +214,12 @@ impl AnyWidth for ForwardBlock<'_> {
 
 /// The flange in the base.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn flange_frame<R: SinCos>(
+fn flange_frame<R: SinCos, const MOVES: bool>(
     arm: &PreparedModel<'_>,
     flange: &Option<FrameColumns<f64>>,
     angle: &[R; 6],
 ) -> FrameColumns<R> {
-    let end = arm.last_frame_of(angle);
+    let end = arm.last_frame_of::<R, MOVES>(angle);
     match flange {
         Some(flange) => end.compose(flange),
         None => end,

@@ -181,7 +181,7 @@ pub struct FlangePoint<'a> {
 type Eight = [f64; WIDTH];
 
 /// Velocities of points on the last frame for the link parameters (zero for all others); returns the points in the base (mm).
-struct LinkVelocities<'a> {
+struct LinkVelocities<'a, const MOVES: bool> {
     arm: &'a PreparedModel<'a>,
     angles: &'a [Eight; 6],
     rides: &'a [Eight; 3],
@@ -190,14 +190,15 @@ struct LinkVelocities<'a> {
     velocities: &'a mut [[Eight; 3]],
 }
 
-impl AnyWidth for LinkVelocities<'_> {
+impl<const MOVES: bool> AnyWidth for LinkVelocities<'_, MOVES> {
     type Output = [Eight; 3];
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn run<R: SinCos>(self, like: R) -> [Eight; 3] {
         let mut points = [[0.0; WIDTH]; 3];
         for from in (0..WIDTH).step_by(R::ROWS) {
-            let frames = self.arm.frames_of(&loaded(like, self.angles, from));
+            let mapped = self.arm.apply_joint_map(&loaded(like, self.angles, from));
+            let frames = self.arm.frames_at::<R, MOVES>(&mapped);
             let rides = loaded(like, self.rides, from);
             let mut point = frames.origin[6];
             for (k, coordinate) in point.iter_mut().enumerate() {
@@ -407,14 +408,12 @@ impl Estimated {
         let rides: [Vector3<f64>; WIDTH] =
             std::array::from_fn(|k| (arm.model.flange * row(k).flange_from_tool).translation.vector);
         let rides: [Eight; 3] = std::array::from_fn(|i| std::array::from_fn(|k| rides[k][i]));
-        let at = vectorised(LinkVelocities {
-            arm,
-            angles: &angles,
-            rides: &rides,
-            scale: 1.0 + growth,
-            order: &self.order,
-            velocities,
-        });
+        let (angles, rides, scale, order) = (&angles, &rides, 1.0 + growth, &self.order);
+        let at = if arm.moves_links() {
+            vectorised(LinkVelocities::<true> { arm, angles, rides, scale, order, velocities })
+        } else {
+            vectorised(LinkVelocities::<false> { arm, angles, rides, scale, order, velocities })
+        };
         if !arm.model.effects.is_empty() {
             let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i][k]) };
             for k in 0..block.len() {

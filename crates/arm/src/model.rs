@@ -176,21 +176,29 @@ impl PreparedModel<'_> {
     /// All joint frames in the base, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn frames_of<R: SinCos>(&self, q: &[R; 6]) -> Chain<R> {
-        self.frames_at(&self.apply_joint_map(q))
+        let mapped = self.apply_joint_map(q);
+        if self.moves_links {
+            self.frames_at::<R, true>(&mapped)
+        } else {
+            self.frames_at::<R, false>(&mapped)
+        }
     }
 
-    /// The same for mapped angles.
+    /// Whether an effect moves links. Kernels are compiled for either kind of arm: what only one of them needs costs the other registers.
+    pub(crate) fn moves_links(&self) -> bool {
+        self.moves_links
+    }
+
+    /// The same for mapped angles, of an arm whose effects move links or of one whose do not.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(crate) fn frames_at<R: SinCos>(&self, mapped: &[R; 6]) -> Chain<R> {
+    pub(crate) fn frames_at<R: SinCos, const MOVES: bool>(&self, mapped: &[R; 6]) -> Chain<R> {
         let rotations = self.apply_effects(mapped);
         let (mut sin, mut cos) = (rotations, rotations);
         for i in 0..6 {
             (sin[i], cos[i]) = sin_cos(rotations[i]);
         }
         let mut frames = chain::chain(&self.tables, &sin, &cos);
-        if self.moves_links
-            && let Some(statics) = &self.statics
-        {
+        if MOVES && let Some(statics) = &self.statics {
             for effect in &self.model.effects {
                 if let Some(first) = effect.first_moved_frame() {
                     let motion = effect.link_motion(statics, (mapped, &rotations), &self.of_effects, &frames);
@@ -203,10 +211,10 @@ impl PreparedModel<'_> {
 
     /// The last frame alone, with the bits of [`PreparedModel::frames_of`].
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(crate) fn last_frame_of<R: SinCos>(&self, q: &[R; 6]) -> FrameColumns<R> {
+    pub(crate) fn last_frame_of<R: SinCos, const MOVES: bool>(&self, q: &[R; 6]) -> FrameColumns<R> {
         let mapped = self.apply_joint_map(q);
-        if self.moves_links {
-            let frames = self.frames_at(&mapped);
+        if MOVES {
+            let frames = self.frames_at::<R, true>(&mapped);
             return FrameColumns { axes: [frames.x, frames.y[5], frames.z[6]], origin: frames.origin[6] };
         }
         let rotations = self.apply_effects(&mapped);

@@ -229,9 +229,10 @@ fn missing_turn<R: SinCos>(axes: &[[R; 3]; 3], goal: &[[R; 3]; 3]) -> ([R; 3], R
 }
 
 impl Kernel {
-    /// Solves for the mapped angles at which the last frame is at `goal`, from `start`.
+    /// Solves for the mapped angles at which the last frame is at `goal`, from `start`, of an arm whose effects move links or of one whose do
+    /// not.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn solve<R: SinCos>(
+    pub(super) fn solve<R: SinCos, const MOVES: bool>(
         &self,
         arm: &PreparedModel<'_>,
         structure: &Structure,
@@ -249,7 +250,7 @@ impl Kernel {
         let mut first_margins = [zero; 3];
         let mut step = 0;
         loop {
-            let frames = arm.frames_at(&mapped);
+            let frames = arm.frames_at::<R, MOVES>(&mapped);
             let axes = [frames.x, frames.y[5], frames.z[6]];
             let wrist = at(&frames.origin[6], &axes, &self.wrist_mm);
             let flange = at(&frames.origin[6], &axes, &self.flange_mm);

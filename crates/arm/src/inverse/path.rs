@@ -266,7 +266,12 @@ impl Inverse<'_> {
         let t = target.translation.vector;
         let goal = self.last_frame_goal(&[q.x, q.y, q.z, q.w], &[t.x, t.y, t.z]);
         let start = self.arm.apply_joint_map(&(*seed).into());
-        self.kernel.solve(&self.arm, &self.structure, &goal, &start, Outputs::Full)
+        let (arm, structure) = (&self.arm, &self.structure);
+        if arm.moves_links() {
+            self.kernel.solve::<f64, true>(arm, structure, &goal, &start, Outputs::Full)
+        } else {
+            self.kernel.solve::<f64, false>(arm, structure, &goal, &start, Outputs::Full)
+        }
     }
 
     /// The kernel on up to eight targets; the last one fills the lanes. `lanes` is a buffer.
@@ -290,7 +295,11 @@ impl Inverse<'_> {
                 lanes.start[i][k] = seeds[k][i];
             }
         }
-        vectorised(Block { inverse: self, targets: lanes, outputs, solved });
+        if self.arm.moves_links() {
+            vectorised(Block::<true> { inverse: self, targets: lanes, outputs, solved });
+        } else {
+            vectorised(Block::<false> { inverse: self, targets: lanes, outputs, solved });
+        }
     }
 
     /// The last frame for a pose of the flange, given by quaternion (x, y, z, w) and translation.
@@ -334,14 +343,14 @@ struct Targets {
 }
 
 /// The kernel on eight targets.
-struct Block<'a> {
+struct Block<'a, const MOVES: bool> {
     inverse: &'a Inverse<'a>,
     targets: &'a Targets,
     outputs: Outputs,
     solved: &'a mut Solved<Eight>,
 }
 
-impl AnyWidth for Block<'_> {
+impl<const MOVES: bool> AnyWidth for Block<'_, MOVES> {
     type Output = ();
 
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -360,7 +369,8 @@ impl AnyWidth for Block<'_> {
                 start[k] = like.load(&targets.start[k], from);
             }
             let goal = self.inverse.last_frame_goal(&quaternion, &translation);
-            let solved = kernel.solve(arm, structure, &goal, &arm.apply_joint_map(&start), self.outputs);
+            let start = arm.apply_joint_map(&start);
+            let solved = kernel.solve::<R, MOVES>(arm, structure, &goal, &start, self.outputs);
             for k in 0..6 {
                 solved.mapped[k].store(&mut out.mapped[k], from);
             }

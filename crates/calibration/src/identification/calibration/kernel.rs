@@ -24,11 +24,16 @@ pub(super) fn fill(
     jacobian: Option<Axes>,
     out: &mut [f64],
 ) {
-    vectorised(Fill { problem, state, from, lanes, jacobian, out });
+    // Compiled for arms whose links move and for others: what only one of them needs costs the other registers.
+    if problem.columns.moved.is_some() {
+        vectorised(Fill::<true> { problem, state, from, lanes, jacobian, out });
+    } else {
+        vectorised(Fill::<false> { problem, state, from, lanes, jacobian, out });
+    }
 }
 
 /// See [`CalibrationProblem::fill`].
-struct Fill<'a> {
+struct Fill<'a, const MOVES: bool> {
     problem: &'a CalibrationProblem,
     state: &'a State,
     from: usize,
@@ -37,7 +42,7 @@ struct Fill<'a> {
     out: &'a mut [f64],
 }
 
-impl AnyWidth for Fill<'_> {
+impl<const MOVES: bool> AnyWidth for Fill<'_, MOVES> {
     type Output = ();
 
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -47,7 +52,7 @@ impl AnyWidth for Fill<'_> {
         match problem.sensor {
             Sensor::Cable => {
                 for row_index in (0..rows).step_by(R::ROWS) {
-                    cable_rows(
+                    cable_rows::<R, MOVES>(
                         like,
                         problem,
                         state,
@@ -62,7 +67,7 @@ impl AnyWidth for Fill<'_> {
             Sensor::Position | Sensor::Pose => {
                 let oriented = problem.sensor == Sensor::Pose;
                 for row_index in (0..rows).step_by(R::ROWS) {
-                    spatial_rows(
+                    spatial_rows::<R, MOVES>(
                         like,
                         problem,
                         state,

@@ -49,7 +49,7 @@ fn is_anchor<R: Real>(like: R, problem: &CalibrationProblem, at: usize, anchor: 
 
 /// Column of an effect: the joint rotations, the growth and the motion of the links per unit, along the cable; `p` is the target.
 #[inline(always)]
-fn effect_projection<R: Real>(
+fn effect_projection<R: Real, const MOVES: bool>(
     (frames, moved, p): (&Chain<R>, &LinkMotion<R>, &V<R>),
     u: &V<R>,
     moment: &[V<R>; 7],
@@ -73,7 +73,7 @@ fn effect_projection<R: Real>(
         }
         sum += like.load(growth, at) * grown;
     }
-    if let Some(columns) = &effect.moved {
+    if MOVES && let Some(columns) = &effect.moved {
         let [v, _] = moved.twist(&motion(like, columns, at), p);
         sum += dot(&v, u);
     }
@@ -82,7 +82,7 @@ fn effect_projection<R: Real>(
 
 #[allow(clippy::too_many_arguments)]
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn cable_rows<R: SinCos>(
+pub(super) fn cable_rows<R: SinCos, const MOVES: bool>(
     like: R,
     problem: &CalibrationProblem,
     state: &State,
@@ -93,7 +93,7 @@ pub(super) fn cable_rows<R: SinCos>(
     out: &mut [f64],
 ) {
     let weight = like.load(&problem.weights.per_mm, at);
-    let RowFrames { frames, scale, moved } = frames(like, problem, state, at);
+    let RowFrames { frames, scale, moved } = frames::<R, MOVES>(like, problem, state, at);
     let p = target_point(&frames, state, at);
     let (outlet, zero) = outlet_and_zero(like, problem, state, at);
     let mut v = minus(&p, &outlet);
@@ -153,7 +153,7 @@ pub(super) fn cable_rows<R: SinCos>(
             Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
                 problem.columns.effect_of(k).map_or(none, |effect| {
                     let arm = (&frames, &moved, &p);
-                    effect_projection(arm, &u, &moment, effect, &state.links_mm, at)
+                    effect_projection::<R, MOVES>(arm, &u, &moment, effect, &state.links_mm, at)
                 })
             }
             Parameter::SensorFrame(_) | Parameter::Target(_) => none,

@@ -43,7 +43,7 @@ pub(super) struct RowFrames<R> {
 
 /// Link frames of the rows.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn frames<R: SinCos>(
+pub(super) fn frames<R: SinCos, const MOVES: bool>(
     like: R,
     problem: &CalibrationProblem,
     state: &State,
@@ -81,7 +81,7 @@ pub(super) fn frames<R: SinCos>(
     }
     let mut frames = scaled_chain(&state.tables, &sin, &cos, scale);
     let mut moved = LinkMotion::none(like);
-    if let Some(of_start) = &columns.moved {
+    if MOVES && let Some(of_start) = &columns.moved {
         moved = motion(like, of_start, at);
         for (effect, value) in columns.effects.iter().zip(&state.effects) {
             if let Some(of_effect) = &effect.moved {

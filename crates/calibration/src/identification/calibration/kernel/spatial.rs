@@ -88,7 +88,7 @@ fn times<R: Real>(columns: &[V<R>; 3], v: &V<R>) -> V<R> {
 
 /// Twist of the target per unit of an effect: the joint rotations, the growth and the motion of the links.
 #[inline(always)]
-fn effect_twist<R: Real>(
+fn effect_twist<R: Real, const MOVES: bool>(
     (frames, moved): (&Chain<R>, &LinkMotion<R>),
     p: &V<R>,
     effect: &EffectColumns,
@@ -113,7 +113,7 @@ fn effect_twist<R: Real>(
             add(&mut sum, grown * like.splat(*d), &up);
         }
     }
-    if let Some(columns) = &effect.moved {
+    if MOVES && let Some(columns) = &effect.moved {
         let [v, w] = moved.twist(&motion(like, columns, at), p);
         add(&mut sum, like.splat(1.0), &(v, w));
     }
@@ -207,8 +207,8 @@ struct Change<R> {
 
 impl<R: SinCos> Compared<R> {
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn of(like: R, problem: &CalibrationProblem, state: &State, at: usize) -> Self {
-        let RowFrames { frames, scale, moved } = frames(like, problem, state, at);
+    fn of<const MOVES: bool>(like: R, problem: &CalibrationProblem, state: &State, at: usize) -> Self {
+        let RowFrames { frames, scale, moved } = frames::<R, MOVES>(like, problem, state, at);
         let target = target_point(&frames, state, at);
         let rotation = state.base_from_sensor.rotation.to_rotation_matrix();
         let sensor = [0, 1, 2].map(|k| splat(like, &rotation.matrix().column(k).into()));
@@ -227,7 +227,7 @@ impl<R: SinCos> Compared<R> {
 
     /// Motion per unit of parameter `k`.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn change(
+    fn change<const MOVES: bool>(
         &self,
         problem: &CalibrationProblem,
         state: &State,
@@ -270,8 +270,9 @@ impl<R: SinCos> Compared<R> {
                 self.disturbed(problem, state, (index, parameter), at)
             }
             Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
-                let of =
-                    |effect| effect_twist((frames, &self.moved), &self.target, effect, &state.links_mm, at);
+                let of = |effect| {
+                    effect_twist::<R, MOVES>((frames, &self.moved), &self.target, effect, &state.links_mm, at)
+                };
                 of_arm(problem.columns.effect_of(k).map_or((none, none), of))
             }
             Parameter::Outlet { .. } | Parameter::Zero { .. } => of_arm((none, none)),
@@ -324,7 +325,7 @@ impl<R: SinCos> Compared<R> {
 
 #[allow(clippy::too_many_arguments)]
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn spatial_rows<R: SinCos>(
+pub(super) fn spatial_rows<R: SinCos, const MOVES: bool>(
     like: R,
     problem: &CalibrationProblem,
     state: &State,
@@ -338,7 +339,7 @@ pub(super) fn spatial_rows<R: SinCos>(
     let weight = like.load(&problem.weights.per_mm, at);
     let rotation_weight = if oriented { like.load(&problem.weights.per_rad, at) } else { weight };
     let components = if oriented { 6 } else { 3 };
-    let compared = Compared::of(like, problem, state, at);
+    let compared = Compared::of::<MOVES>(like, problem, state, at);
     let last = if jacobian.is_some() { problem.parameters.len() } else { 0 };
     for k in 0..3 {
         let residual = weight * (compared.measured[k] - compared.gain * compared.from_sensor[k]);
@@ -358,7 +359,7 @@ pub(super) fn spatial_rows<R: SinCos>(
     let Some(axes) = jacobian else { return };
     for k in 0..problem.parameters.len() {
         let Change { twist, sensor_side, turns_axes, is_scaled } =
-            compared.change(problem, state, k, axes, at);
+            compared.change::<MOVES>(problem, state, k, axes, at);
         let size = if is_scaled { weight * compared.gain } else { weight };
         let sign = if sensor_side { size } else { -size };
         for (i, v) in twist.0.into_iter().enumerate() {
