@@ -29,23 +29,28 @@ pub(super) fn columns(
     slopes: &Slopes,
     per: usize,
 ) -> Option<DMatrix<f64>> {
-    let drift = drift(cause)?;
-    let course = subject.observed.dataset.rows.iter().map(|row| drift.profile.at(row));
-    let course = DVector::from_vec(course.collect());
-    products(slopes, &DMatrix::from_columns(&[course]), per)
+    products(slopes, &DMatrix::from_columns(&[course(drift(cause)?, subject)]), per)
+}
+
+/// The factor of a drift in each row.
+fn course(drift: &Disturbance, subject: &Subject<'_>) -> DVector<f64> {
+    DVector::from_vec(subject.observed.dataset.rows.iter().map(|row| drift.profile.at(row)).collect())
 }
 
 /// Growth of the links for every drift of the sensor in a fit, as random effects whose coefficients have variance 1: with the course of
 /// the drift and with any other over time, each together as large in the readings as the drift itself.
+///
+/// Growth counts from its mean over the rows, so that the written arm has the links' lengths in the middle of the run. Counted from the
+/// first row, a course that soon saturates is nearly 1 in all rows: growth was then an error of the lengths that no row contradicts.
 pub(super) fn random_effects(subject: &Subject<'_>, fit: &Extended, linear: &Linear) -> Vec<DMatrix<f64>> {
     let (slopes, per) = (&linear.slopes, linear.per);
-    let drifts =
-        (0..fit.causes.len()).filter_map(|k| Some((k, columns(&fit.causes[k], subject, slopes, per)?)));
+    let drifts = (0..fit.causes.len()).filter_map(|k| Some((k, course(drift(&fit.causes[k])?, subject))));
     let mut out: Vec<DMatrix<f64>> = drifts
-        .flat_map(|(k, same)| {
+        .flat_map(|(k, course)| {
             let drifted = linear.readings_of(fit, k).norm();
-            let other = products(slopes, &cosines(linear.observations), per);
-            [Some(same), other]
+            let same = course.add_scalar(-course.mean());
+            [DMatrix::from_columns(&[same]), cosines(linear.observations)]
+                .map(|courses| products(slopes, &courses, per))
                 .into_iter()
                 .flatten()
                 .map(move |columns| &columns * (drifted / columns.norm()))
