@@ -207,10 +207,7 @@ pub fn fit(
             Some(_) => before,
             None => rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles),
         };
-        let variances = estimate.covariance.as_ref().map(|covariance| covariance.diagonal());
-        let determined =
-            variances.map_or(0.0, |found| effective_parameters(found.iter().copied(), problem.priors()));
-        (sigma_mm, sigma_rad) = noise_sigmas(&problem, &x, &shares, determined);
+        (sigma_mm, sigma_rad) = noise_sigmas(&problem, &x, &shares, residual_share(&problem, &estimate));
         rounds.push(estimate.trace.clone());
         if tolerance.learn_widths && round < ROUNDS {
             let learned = learn_tolerance(tolerance, parameters, &priors, &estimate);
@@ -260,17 +257,15 @@ impl StepBudget {
     }
 }
 
-/// The standard deviations σ with Σ r²/(σ² + share) = rows − determined, for lengths and for orientations.
+/// The standard deviations σ with Σ r²/(σ² + share) = n − k ([`residual_share`]), for lengths and for orientations.
 fn noise_sigmas(
     problem: &CalibrationProblem,
     x: &[f64],
     shares: &[(f64, f64)],
-    determined: f64,
+    freedom_share: f64,
 ) -> (f64, f64) {
     let per = problem.rows_per_observation();
     let plain = problem.unweighted_residuals(x);
-    let rows = plain.len() as f64;
-    let freedom_share = ((rows - determined) / rows).max(0.1);
     let solve = |components: std::ops::Range<usize>, share: fn(&(f64, f64)) -> f64, smallest: f64| {
         // Squared residual and share; recomputed rather than stored, as there can be a million rows.
         let squares = || {
@@ -373,11 +368,12 @@ pub fn outliers(
             .zip(&priors)
             .map(|((a, b), p)| ((a - b) / p.sigma).abs())
             .fold(0.0, f64::max);
+        let left = residual_share(&problem, &estimate).sqrt();
         x = estimate.x;
         (model, frames) = problem.apply(&x);
         errors = problem.errors_mm(&x);
         let sizes: Vec<f64> = errors.iter().zip(&base).map(|(e, w)| e.abs() * w.per_mm).collect();
-        let spread = (median(&sizes).unwrap_or(1.0) * consistency).max(1e-9);
+        let spread = (median(&sizes).unwrap_or(1.0) * consistency / left).max(1e-9);
         scaled = sizes.iter().map(|s| s / spread).collect();
         sigma = (sigma * spread).max(MIN_SIGMA_MM);
         for (f, s) in factor.iter_mut().zip(&scaled) {
@@ -410,6 +406,19 @@ pub fn outliers(
     }
     Outliers { rows, too_many: 0 }
 }
+
+/// Share of the noise's variance that a fit leaves in the residuals, 1 − k/n with k parameters determined by n readings. With few readings
+/// most residuals are smaller than the noise, and a healthy row would lie beyond ten times their median.
+fn residual_share(problem: &CalibrationProblem, estimate: &Estimate) -> f64 {
+    let variances = estimate.covariance.as_ref().map(|covariance| covariance.diagonal());
+    let determined =
+        variances.map_or(0.0, |found| effective_parameters(found.iter().copied(), problem.priors()));
+    let rows = problem.rows() as f64;
+    ((rows - determined) / rows).max(MIN_RESIDUAL_SHARE)
+}
+
+/// Least such share: the effective number of parameters is approximate.
+const MIN_RESIDUAL_SHARE: f64 = 0.1;
 
 const ROBUST_ROUNDS: usize = 12;
 /// Tuning constant of the Cauchy weight: 95 % efficiency on normal errors.

@@ -2,6 +2,7 @@
 
 mod beyond_noise;
 mod calibration;
+mod fit;
 mod mixed_rows;
 mod prior_width;
 mod promise;
