@@ -96,7 +96,8 @@ impl CellArguments {
         }
         if model.is_some_and(|model| growth_per_k(model).is_none()) {
             bail!(
-                "--temperature {celsius}: the model does not say how the arm grows per kelvin: measure it cold and warm, with its temperature in the                  column `temperature`, or omit --temperature"
+                "--temperature {celsius}: the model does not say how the arm grows per kelvin: measure it cold and warm, with its temperature in the \
+                 column `temperature`, or omit --temperature"
             );
         }
         Ok(())
