@@ -22,7 +22,7 @@ pub fn growth_per_k(arm: &Estimated) -> Option<f64> {
 
 /// For which warmth of the arm programs are corrected; no σ counts another one.
 pub(crate) fn warmth_note(arms: &Arms<'_>, options: &Options) -> Option<String> {
-    let (effect, thermal) = thermal(&arms.estimated.arm().model)?;
+    let (effect, thermal) = thermal(arms.estimated.arm().model)?;
     let condition = &options.condition;
     if let Some(celsius) = condition.temperature_c.filter(|_| thermal.growth_per_k != 0.0) {
         return Some(format!(
