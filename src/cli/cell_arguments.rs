@@ -1,5 +1,6 @@
 //! Options that describe the cell a program runs in, shared by `compensate`, `deviation` and `view`.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
@@ -10,6 +11,7 @@ use truegrind::arm::model::Model;
 use truegrind::compensation::cell::{Cell, Used};
 use truegrind::compensation::condition::other_load::is_other_load;
 use truegrind::compensation::condition::overload::{overload, rated_payload_kg, stated_overload};
+use truegrind::compensation::condition::warmth::growth_per_k;
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
 use truegrind::programs::motion::Listing;
@@ -23,7 +25,10 @@ use super::terminal::print_message;
 /// Payloads above this are typing errors (kg).
 const MAX_PAYLOAD_KG: f64 = 3000.0;
 
-/// Cell, surface and payload.
+/// Temperatures of an arm; others are typing errors (°C).
+const TEMPERATURES_C: RangeInclusive<f64> = -40.0..=120.0;
+
+/// Cell, surface, payload and temperature.
 #[derive(Debug, Clone, Args)]
 pub(super) struct CellArguments {
     /// Cell file: origins of tools and work objects, measured or taught with their teaching points.
@@ -39,6 +44,10 @@ pub(super) struct CellArguments {
     /// Centre of mass of the payload in the flange frame (mm).
     #[arg(long, value_name = "X,Y,Z", requires = "payload", allow_hyphen_values = true)]
     pub(super) payload_centre: Option<String>,
+    /// Temperature of the arm while the program runs (°C), if the model says how its links grow per kelvin. Default: that of
+    /// the measurement.
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
+    pub(super) temperature: Option<f64>,
 }
 
 impl CellArguments {
@@ -67,10 +76,31 @@ impl CellArguments {
         };
         let mut condition = model.map(|m| m.condition).unwrap_or_default();
         condition.payload_kg = self.payload.or(condition.payload_kg);
+        self.refuse_temperature(model)?;
+        condition.temperature_c = self.temperature.or(condition.temperature_c);
         if let Some(text) = &self.payload_centre {
             condition.payload_centre_mm = super::stated_frames::triple("--payload-centre", text)?;
         }
         Ok((cell, surface, condition))
+    }
+
+    /// Refuses a temperature that no arm has, or that the model cannot follow.
+    fn refuse_temperature(&self, model: Option<&Estimated>) -> anyhow::Result<()> {
+        let Some(celsius) = self.temperature else { return Ok(()) };
+        if !TEMPERATURES_C.contains(&celsius) {
+            bail!(
+                "--temperature {celsius}: expected the temperature of the arm in °C, from {} to {}",
+                TEMPERATURES_C.start(),
+                TEMPERATURES_C.end()
+            );
+        }
+        if model.is_some_and(|model| growth_per_k(model).is_none()) {
+            bail!(
+                "--temperature {celsius}: the model does not say how the arm grows per kelvin: measure it cold and warm, with its temperature in the \
+                 column `temperature`, or omit --temperature"
+            );
+        }
+        Ok(())
     }
 
     /// Refuses a payload that the model cannot follow.

@@ -157,6 +157,8 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
             differences: Vec::new(),
             between: None,
             held_out_mm: context.corrector.map(|c| c.arm.calibrated.held_out.rmse),
+            turn_sigma_rad: None,
+            assumptions: Vec::new(),
         };
         let reports = if context.corrector.is_some() { std::slice::from_ref(&report) } else { &[] };
         outputs.add_made(

@@ -195,7 +195,9 @@ fn agreed(
     let most_kg =
         stated.as_ref().map(|stated| stated.most_kg).into_iter().chain(options.condition.payload_kg);
     planned.is_overloaded = most_kg.into_iter().any(|kg| is_far_above_rating(kg, &arm.robot));
-    planned.other_loads = other_loads(program.listing(), arm, options, &planned.outcomes);
+    let corrected = planned.outcomes.iter().filter(|outcome| outcome.status.is_written());
+    let corrected = corrected.map(|outcome| (outcome.motion as usize, outcome.sigma_mm.get()));
+    planned.other_loads = other_loads(program.listing(), arm, (loads, &options.condition), corrected);
     planned.notes.extend(stated.map(|stated| stated.note));
     if program.language() == Language::Rapid
         && let Some(off) = single_precision(&planned.changes)

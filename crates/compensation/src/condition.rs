@@ -4,3 +4,4 @@ pub(crate) mod arm_conditions;
 pub mod other_load;
 pub mod overload;
 pub mod payload;
+pub mod warmth;

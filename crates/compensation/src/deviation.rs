@@ -206,6 +206,10 @@ pub struct PathReport {
     pub between: Option<BetweenTargets>,
     /// Held-out error of the model [mm RMSE], where it has one.
     pub held_out_mm: Option<f64>,
+    /// Largest standard deviation of the tool's orientation at the points (rad), where a model states one.
+    pub turn_sigma_rad: Option<f64>,
+    /// What the deviations rest on without knowing it, each a warning.
+    pub assumptions: Vec<String>,
 }
 
 /// The path of a rewritten program between the targets of the original.

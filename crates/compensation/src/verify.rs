@@ -9,7 +9,7 @@ mod differences;
 mod executed_end;
 mod kept_placement;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Translation3, Vector3};
 
 use self::alignment::align;
 use self::between_targets::Followed;
@@ -19,16 +19,18 @@ use self::kept_placement::KeptPlacement;
 use crate::arms::Arms;
 use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
+use crate::condition::other_load::other_loads;
 use crate::deviation::{
     After, Deviation, MissingMotions, MotionStatus, ON_SURFACE_MM, PathPoint, PathReport, files_of,
 };
 use crate::feasibility::measured_turns::outside_along;
 use crate::frames::frame_table::FrameTable;
+use crate::plan::notes::unstated_turn_note;
 use crate::plan::reason::OutcomeReason;
 use crate::risk::fixtures::{self, part_of_motion};
 use crate::segment::condition_schedule::ConditionSchedule;
 use truegrind_arm::condition::Condition;
-use truegrind_arm::estimated::{Estimated, RegisteredFrame};
+use truegrind_arm::estimated::{Estimated, FlangePoint, RegisteredFrame};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::region::NearestSample;
 use truegrind_math::se3::Pose;
@@ -138,19 +140,37 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         Followed { original, rewritten: listing, partners, before, after, run, is_same: &is_same_target }
             .judged(&arms, task.tolerance_mm)
     });
+    let mut turn_sigma_rad: Option<f64> = None;
     let points = before.iter().enumerate().map(|(index, first)| {
         checkpoint();
         let second = after.as_ref().and_then(|after| after.ends[after.partners[first.motion]?]);
         let real = &frame_table.list[first.frames_index].real;
         let part = part_of_motion(&task.original.motions[first.motion], &part_of);
-        path_point(index, (first, second), (part, real.object), task, acting_arm, &arms)
+        let sigma =
+            acting_arm.knowledge.map(|knowledge| Sigma::of(second.unwrap_or(first), first, knowledge, &arms));
+        turn_sigma_rad = sigma.map(|sigma| sigma.turn_rad).into_iter().chain(turn_sigma_rad).reduce(f64::max);
+        path_point(index, (first, second), (part, real.object), task, acting_arm, sigma)
+    });
+    let points: Vec<PathPoint> = points.collect();
+    let judged =
+        before.iter().zip(&points).filter(|(_, point)| task.rewritten.is_none() || point.is_corrected());
+    let loaded = acting_arm.knowledge.map_or(0, |knowledge| {
+        let judged = judged.map(|(end, point)| (end.motion, point.sigma_mm));
+        other_loads(task.original, knowledge, (task.loads[0], &acting_arm.condition), judged)
+    });
+    let other_load = (loaded > 0).then(|| {
+        let motions = if loaded == 1 { "1 motion carries" } else { &format!("{loaded} motions carry") };
+        format!(
+            "{motions} another load than the measurement did, and the deflection of this arm is known for that one alone: the deviations there hold \
+             without the difference"
+        )
     });
     PathReport {
         program: task.program.to_owned(),
         files: files_of(task.original),
         model: task.name.to_owned(),
         after: task.after,
-        points: points.collect(),
+        points,
         missing: MissingMotions::of(task.original, |motion| {
             let (_, reason) =
                 without_end.get(without_end.binary_search_by_key(&motion, |(of, _)| *of).ok()?)?;
@@ -159,6 +179,37 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         differences,
         between,
         held_out_mm: acting_arm.knowledge.map(|k| k.calibrated.held_out.rmse),
+        turn_sigma_rad,
+        assumptions: unstated_turn_note(task.original).into_iter().chain(other_load).collect(),
+    }
+}
+
+/// Standard deviation of where the arm holds a tool.
+#[derive(Debug, Clone, Copy)]
+struct Sigma {
+    position_mm: f64,
+    turn_rad: f64,
+}
+
+/// A point so far from the tool's tip (mm) that it moves only by the tool's turn.
+const FAR_MM: f64 = 1e6;
+
+impl Sigma {
+    /// At the joints of `at`, of the tool of `first`.
+    fn of(at: &ExecutedEnd, first: &ExecutedEnd, knowledge: &Estimated, arms: &Arms<'_>) -> Self {
+        let carried = first.carried.as_ref().map(RegisteredFrame::carried);
+        let tools = [0, 1, 2, 3].map(|axis| {
+            let away = if axis == 0 { Vector3::zeros() } else { Vector3::ith(axis - 1, FAR_MM) };
+            first.flange_from_tool * Translation3::from(away)
+        });
+        let point = |tool: Pose| FlangePoint { joints: at.joints, flange_from_tool: tool, carried };
+        let known = knowledge.position_sigmas_mm(arms.conditions.arm(at.condition_index), &tools.map(point));
+        let sigma = |k: usize| {
+            known[k].hypot(arms.conditions.play_uncertainty_mm(at.condition_index, &at.joints, &tools[k]))
+        };
+        // A turn by ω moves the three far points by ω × r, whose squares add up to 2 |ω|² r².
+        let far = (1..4).map(|k| sigma(k).powi(2)).sum::<f64>();
+        Self { position_mm: sigma(0), turn_rad: (far / 2.0).sqrt() / FAR_MM }
     }
 }
 
@@ -169,7 +220,7 @@ fn path_point(
     (part, part_from_object): (u32, Pose),
     task: &VerificationTask<'_>,
     acting_arm: &ActingArm<'_>,
-    arms: &Arms<'_>,
+    sigma: Option<Sigma>,
 ) -> PathPoint {
     let motion = &task.original.motions[first.motion];
     let contact = task.surface.and_then(|s| s.foot(&Point3::from(first.commanded.translation.vector)));
@@ -178,8 +229,7 @@ fn path_point(
     let deviation =
         |reached: &Pose| Deviation::between(&first.commanded, reached, &Pose::identity(), normal.as_ref());
     let same = second.is_some_and(|second| is_same_target(first, second));
-    let (joints, condition_index) =
-        second.map_or((first.joints, first.condition_index), |s| (s.joints, s.condition_index));
+    let joints = second.unwrap_or(first).joints;
     let linear = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
     PathPoint {
         index,
@@ -198,12 +248,7 @@ fn path_point(
         joints_after: second.map(|s| s.joints),
         before: Some(deviation(&first.reached)),
         after: second.map(|s| deviation(&s.reached)),
-        sigma_mm: acting_arm.knowledge.map(|k| {
-            let (tool, carried) = (&first.flange_from_tool, first.carried.as_ref());
-            let carried = carried.map(RegisteredFrame::carried);
-            let known = k.position_sigma_mm(arms.conditions.arm(condition_index), &joints, tool, carried);
-            known.hypot(arms.conditions.play_uncertainty_mm(condition_index, &joints, tool))
-        }),
+        sigma_mm: sigma.map(|sigma| sigma.position_mm),
         shape_sigma_mm: None,
         outside: acting_arm.knowledge.and_then(|k| outside_along(k, &joints, &mut NearestSample::default())),
         status: if second.is_some() && !same { MotionStatus::Changed } else { MotionStatus::Left },

@@ -417,6 +417,8 @@ fn model_json(report: &PathReport) -> Value {
         "model": report.model,
         "after_is": report.after,
         "model_held_out_rmse_mm": report.held_out_mm,
+        "turn_sigma_deg": report.turn_sigma_rad.map(f64::to_degrees),
+        "assumptions": report.assumptions,
         "differences": report.differences,
         "between_targets": report.between.as_ref().map(|between| json!({
             "tolerance_mm": between.tolerance_mm,

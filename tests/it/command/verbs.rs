@@ -32,7 +32,7 @@ pub(super) struct Verb {
     pub(super) others: &'static [&'static [&'static str]],
 }
 
-pub(super) const CELL: [&str; 4] = ["--cell", "--surface", "--payload", "--payload-centre"];
+pub(super) const CELL: [&str; 5] = ["--cell", "--surface", "--payload", "--payload-centre", "--temperature"];
 
 pub(super) fn verbs() -> Vec<Verb> {
     vec![

@@ -2,12 +2,12 @@
 
 use super::overload::rated_payload_kg;
 use super::payload::payload_at;
-use crate::options::Options;
-use crate::plan::MotionOutcome;
+use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::base_tilt::TiltTerm;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::motion::Listing;
+use truegrind_programs::motion::load::Loads;
 
 /// Share of the rated payload, or else of the measured load, by which a load may differ and still count as the same.
 const SAME_LOAD: f64 = 0.05;
@@ -61,19 +61,18 @@ fn deflection_mm(kg: f64, arm: &Estimated) -> f64 {
     compliance * (kg - measured_kg).abs() * STANDARD_GRAVITY * 1e3
 }
 
-/// How many corrected motions carry such a load, and one that would move the flange by more than is stated of them.
+/// How many of some motions, each with its σ (mm), carry such a load, and one that would move the flange by more than is stated of them.
 pub(crate) fn other_loads(
     listing: &Listing,
     arm: &Estimated,
-    options: &Options,
-    outcomes: &[MotionOutcome],
+    (loads, condition): (Option<&Loads>, &Condition),
+    motions: impl Iterator<Item = (usize, Option<f64>)> + Clone,
 ) -> usize {
-    let kg = |index: usize| match &options.loads {
+    let kg = |index: usize| match loads {
         Some(loads) => payload_at(loads, index, &listing.motions[index], listing).map(|load| load.mass_kg),
-        None => options.condition.payload_kg,
+        None => condition.payload_kg,
     };
-    let corrected = || outcomes.iter().filter(|outcome| outcome.status.is_written());
-    let stated = corrected().filter_map(|outcome| outcome.sigma_mm.get()).fold(0.0, f64::max);
+    let stated = motions.clone().filter_map(|(_, sigma_mm)| sigma_mm).fold(0.0, f64::max);
     let matters = |kg: &f64| is_other_load(*kg, arm) && deflection_mm(*kg, arm) > stated;
-    corrected().filter_map(|outcome| kg(outcome.motion as usize)).filter(matters).count()
+    motions.filter_map(|(motion, _)| kg(motion)).filter(matters).count()
 }

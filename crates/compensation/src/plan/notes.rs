@@ -260,7 +260,7 @@ fn unstated_length_note(listing: &Listing) -> Option<String> {
 }
 
 /// NC files that state a tool vector, and nowhere the turn about it.
-fn unstated_turn_note(listing: &Listing) -> Option<String> {
+pub(crate) fn unstated_turn_note(listing: &Listing) -> Option<String> {
     let lines = numbered(&listing.files, listing.nc.unstated_turns.iter().copied())?;
     Some(format!(
         "no word states the turn about the tool vector, on which the joints of a six-axis arm depend. It was taken as 0: x of the tool lies in the \

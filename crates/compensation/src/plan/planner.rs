@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::arms::Arms;
+use crate::condition::warmth::warmth_note;
 use crate::configuration::monitored;
 use crate::cut::{StartsOf, only_start};
 use crate::deviation::{MotionStatus, PathPoint};
@@ -67,6 +68,7 @@ pub(super) fn planned(job: &Planner<'_>) -> Plan {
     notes.extend(backlash_note(arms, solved));
     notes.extend(doubtful_effects_note(arms));
     notes.extend(load_notes(listing, arms, options));
+    notes.extend(warmth_note(arms, options));
     let unchecked: Vec<u32> = chunks.iter().flat_map(|chunk| chunk.unchecked.iter().copied()).collect();
     notes.extend(unchecked_notes(listing, solved, &unchecked));
     let from_several: Vec<u32> = chunks.iter().flat_map(|chunk| &chunk.from_several).copied().collect();

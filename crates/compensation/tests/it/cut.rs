@@ -510,6 +510,64 @@ fn an_exact_stop_of_an_nc_program_ends_no_cut() {
     }
 }
 
+/// A path whose words are not those of a line or an arc had no tool and no work offset, and so no cut: the motions before and behind it
+/// were corrected, with a step of the whole correction at its ends.
+#[test]
+fn a_path_in_other_words_is_part_of_the_cut_around_it() {
+    let own = [
+        (
+            "p.ngc",
+            "; truegrind angles wpr\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[400,0,250],[1,0,0,0]]\n\
+                   G90 G21 G17 G54\nT1 M6\nG43 H1\nG0 X-20 Y0 Z40 A180 B0 C0\nG1 Z20 F600\nX-10\n",
+            "X10 Y0 Z20 A180 B0 C0\nX20\nG0 Z60\nM2\n",
+            ["@10 ^30\n"].as_slice(),
+        ),
+        (
+            "p.mpf",
+            "; truegrind angles wpr\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[400,0,250],[1,0,0,0]]\n\
+                   N1 G90 G71 G17 G54\nN2 T1 D1 M6\nN3 TRAORI\nG0 X-20 Y0 Z40 A180 B0 C0\nG1 Z20 F600\nX-10\n",
+            "G1 X10 Y0 Z20 A180 B0 C0\nX20\nG0 Z60\nM30\n",
+            ["POLY PO[X]=(5,0.5) PO[Y]=(5,1) PL=10\n", "OSCILL[U]=(X,Y,Z)\n"].as_slice(),
+        ),
+        (
+            "p.h",
+            "0 BEGIN PGM P MM\n; truegrind angles wpr\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n\
+                 ; truegrind frame G54 w [[400,0,250],[1,0,0,0]]\n1 TOOL CALL 1 Z\n2 M128\n3 L X-20 Y+0 Z+40 A+180 B+0 C+0 FMAX\n4 L Z+20 F600\n5 L X-10\n",
+            "20 L X+10 Y+0 Z+20 A+180 B+0 C+0\n21 L X+20\n22 L Z+60 FMAX\n23 END PGM P MM\n",
+            [
+                "6 LP PR+10 PA+30\n",
+                "6 CTP PR+10 PA+5\n",
+                "6 FL AN+30 LEN10\n",
+                "6 APPR LT X+5 Y+0 LEN5 RL\n",
+                "6 SPL X+5 Y+5 Z+20 K3X+0 K2X+0 K1X-5 K3Y+0 K2Y+0 K1Y-5 K3Z+0 K2Z+0 K1Z+0\n",
+            ]
+            .as_slice(),
+        ),
+    ];
+    for (name, head, tail, paths) in own {
+        let of = |path: &str| {
+            let source = [head, path, tail].concat();
+            let setup = Setup { angles: Some(Angles::Wpr), ..Setup::default() };
+            let program = Program::Nc(nc::Task::read(&[(name, source.as_bytes())], &setup));
+            statuses(&compensate(&program, &known(), &Cell::default(), &Options::default(), None).unwrap())
+        };
+        assert!(of("").iter().all(|status| *status == Changed), "{name}: {:?}", of(""));
+        for path in paths {
+            let found = of(path);
+            assert!(!found.iter().any(|status| matches!(status, Changed | Flagged)), "{path}{found:?}");
+        }
+    }
+    // An axis beside the arm moves nothing here: the line behind it begins where the one before it ends.
+    let (_, head, tail, _) = own[1];
+    for block in ["SPOS=90\n", "POS[U]=10\n", "U5\n"] {
+        let source = [head, block, tail].concat();
+        let setup = Setup { angles: Some(Angles::Wpr), ..Setup::default() };
+        let program = Program::Nc(nc::Task::read(&[("p.mpf", source.as_bytes())], &setup));
+        let done = compensate(&program, &known(), &Cell::default(), &Options::default(), None).unwrap();
+        assert_eq!(statuses(&done), [Changed, Changed, Changed, Left, Changed, Changed, Changed], "{block}");
+    }
+}
+
 /// Behind a jump, a label or a call a block without its own G0 or G1 may be a cut: the whole of it stays, and with it the air moves.
 #[test]
 fn a_cut_whose_rest_is_reached_by_jumps_or_calls_stays_whole() {

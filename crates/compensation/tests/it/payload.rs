@@ -1,14 +1,23 @@
-//! Payloads that programs state.
+//! The condition of the arm: payloads that programs state, its warmth, and what a judgement of programs rests on.
 
+use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
+use truegrind_arm::effect::thermal::Thermal;
+use truegrind_arm::estimated::Estimated;
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::compensate::compensate;
 use truegrind_compensation::condition::other_load::is_other_load;
 use truegrind_compensation::condition::overload::stated_overload;
 use truegrind_compensation::condition::payload::payload_at;
+use truegrind_compensation::condition::warmth::growth_per_k;
+use truegrind_compensation::deviation::After;
 use truegrind_compensation::options::Options;
+use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
+use truegrind_programs::motion::Listing;
 use truegrind_programs::motion::load::{Grip, Load, Loads};
+use truegrind_programs::nc;
+use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::rapid::Task;
 use truegrind_programs::reading::Program;
 
@@ -183,4 +192,104 @@ fn a_load_that_the_deflection_does_not_follow_is_counted() {
     arm.condition.payload_kg = Some(2.0);
     assert_eq!([other(&arm, ""), other(&arm, "GripLoad part;")], [0, 1]);
     assert!(!is_other_load(2.1, &arm) && is_other_load(0.0, &arm));
+}
+
+/// `deviation` gave no warning of such a load, and none of a tool vector without a turn.
+#[test]
+fn what_the_judged_deviations_rest_on_is_told() {
+    let mut arm = super::estimated(super::perturbed(3, 1.0), &[truegrind_arm::model::Joints::zeros()]);
+    let lump = Lump { frame: 3, axis: None, moment: None, factor: 1e-2 };
+    arm.model.effects.push(Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump: vec![lump] }));
+    let assumptions = |arm: &Estimated, listing: &Listing, loads: Option<&Loads>| {
+        let judged = VerificationTask {
+            original: listing,
+            rewritten: None,
+            cell: &Cell::default(),
+            surface: None,
+            program: "p",
+            name: "test",
+            after: After::PredictedRemainder,
+            tolerance_mm: 0.05,
+            loads: [loads, loads],
+        };
+        let nominal = super::nominal();
+        let acting = ActingArm {
+            nominal: &nominal,
+            model: &arm.model,
+            knowledge: Some(arm),
+            condition: arm.condition,
+        };
+        verify(&judged, &acting).assumptions
+    };
+    let (task, loads) = grips("PROC main()\n m;\n m;\nENDPROC\n");
+    let told = assumptions(&arm, &task.listing, Some(&loads));
+    assert!(told.len() == 1 && told[0].starts_with("2 motions carry another load"), "{told:?}");
+    arm.condition.payload_kg = Some(2.0);
+    assert!(assumptions(&arm, &task.listing, Some(&loads)).is_empty());
+    let text = "; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[400,0,250],[1,0,0,0]]\n\
+                N1 G90 G71 G17 G54\nN2 T1 D1 M6\nN3 TRAORI\nG1 X0 Y0 Z20 A3=0 B3=0 C3=1 F600\nX10\nM30\n";
+    let task = nc::Task::read(&[("p.mpf", text.as_bytes())], &Setup::default());
+    let told = assumptions(&arm, &task.listing, None);
+    assert!(told.len() == 1 && told[0].contains("turn about the tool vector"), "{told:?}");
+}
+
+/// The orientation of the tool was stated as 0.000° after a correction, however little was known of it.
+#[test]
+fn the_turn_of_a_tool_has_a_standard_deviation() {
+    let (task, _) = grips("PROC main()\n m;\nENDPROC\n");
+    let mut arm = super::estimated(super::perturbed(3, 1.0), &[truegrind_arm::model::Joints::zeros()]);
+    let nominal = super::nominal();
+    let turn_sigma_rad = |arm: &Estimated| {
+        let judged = VerificationTask {
+            original: &task.listing,
+            rewritten: None,
+            cell: &Cell::default(),
+            surface: None,
+            program: "p",
+            name: "test",
+            after: After::PredictedRemainder,
+            tolerance_mm: 0.05,
+            loads: [None, None],
+        };
+        let acting = ActingArm {
+            nominal: &nominal,
+            model: &arm.model,
+            knowledge: Some(arm),
+            condition: arm.condition,
+        };
+        verify(&judged, &acting).turn_sigma_rad.unwrap()
+    };
+    arm.covariance.fill(0.0);
+    assert_eq!(turn_sigma_rad(&arm), 0.0);
+    // The zeros of joints 5 and 6, whose axes are perpendicular.
+    for (name, sigma) in [("link5.theta", 3e-3), ("link6.theta", 4e-3), ("link2.a", 1.0)] {
+        let at = arm.order.iter().position(|parameter| parameter.to_string() == name).unwrap();
+        arm.covariance[(at, at)] = f64::powi(sigma, 2);
+    }
+    assert!((turn_sigma_rad(&arm) - 5e-3).abs() < 2e-5, "{}", turn_sigma_rad(&arm));
+}
+
+/// For which warmth a program is corrected was not said.
+#[test]
+fn the_assumed_warmth_is_told() {
+    let mut arm = super::estimated(super::perturbed(3, 1.0), &[truegrind_arm::model::Joints::zeros()]);
+    let notes = |arm: &Estimated, condition: Condition| {
+        let (task, _) = grips("PROC main()\n m;\nENDPROC\n");
+        let options = Options { condition, ..Options::default() };
+        let notes =
+            compensate(&Program::Rapid(task), arm, &Cell::default(), &options, None).unwrap().plan.notes;
+        notes.into_iter().filter(|note| note.contains("no σ counts")).collect::<Vec<_>>()
+    };
+    let at = Condition { time_h: Some(2.0), temperature_c: Some(31.5), ..Condition::default() };
+    assert!(notes(&arm, at).is_empty());
+    let thermal =
+        Thermal { growth: 0.0, time_constant_h: 1.0, start_h: 0.0, growth_per_k: 1.2e-5, reference_c: 20.0 };
+    arm.model.effects.push(Effect::ThermalDrift(thermal.clone()));
+    assert_eq!(growth_per_k(&arm), Some(1.2e-5));
+    let told = notes(&arm, at);
+    assert!(told.len() == 1 && told[0].contains("31.5 °C") && told[0].contains("0.120 mm"), "{told:?}");
+    arm.model.effects[0] = Effect::ThermalDrift(Thermal { growth: 2e-4, growth_per_k: 0.0, ..thermal });
+    assert_eq!(growth_per_k(&arm), None);
+    let told = notes(&arm, at);
+    assert!(told.len() == 1 && told[0].contains("173 µm per metre"), "{told:?}");
 }

@@ -117,6 +117,8 @@ fn parts(count: usize) -> Parts {
         differences: Vec::new(),
         between: None,
         held_out_mm: Some(0.08),
+        turn_sigma_rad: None,
+        assumptions: Vec::new(),
     };
     Parts { nominal, actual, reports: vec![report], triangles: surface.tessellate(20), base_from_object }
 }

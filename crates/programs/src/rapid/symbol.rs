@@ -6,7 +6,7 @@
 
 mod effects;
 pub(super) mod facts;
-mod late_binding;
+pub(super) mod late_binding;
 mod position_reads;
 mod purity;
 mod solve;
@@ -15,6 +15,7 @@ mod writes;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 pub use self::effects::{SideEffects, Write, WriteKind};
+use self::late_binding::NamePattern;
 use self::position_reads::position_decisions;
 use super::instruction;
 use super::modal::{Switch, SwitchSet};
@@ -166,6 +167,8 @@ pub struct Symbols {
     pub late_list: Vec<u32>,
     /// Those lists, each sorted.
     pub late_lists: Vec<Vec<u32>>,
+    /// The computed names that no procedure of the files has.
+    missing_callees: BTreeSet<NamePattern>,
     /// The switches that the routines of each list set.
     pub late_switches: Vec<SwitchSet>,
     /// Whether each routine may run between any two statements: a trap routine, or called while the robot moves.

@@ -286,4 +286,11 @@ fn calls_of_routines_that_no_file_declares_are_listed() {
     let calls: Vec<_> =
         task.listing.outside_calls.iter().map(|call| (call.name.as_str(), call.place.line)).collect();
     assert_eq!(calls, [("SetShift", 4), ("setshift", 7), ("Elsewhere", 10)]);
+    // By a computed name: where no procedure of the files has such a name.
+    let text = b"MODULE A\n PROC main()\n  %\"own\"%;\n  %\"o\"+b%;\n  %\"A:own\"%;\n  CallByVar \"proc\",1;\n  %b%;\n  %\"Gone\"%;\n  \
+                 %\"Cut\"+b%;\n  CallByVar \"Cut\",3;\n  %\"own\"% 3;\n ENDPROC\n PROC own()\n ENDPROC\n PROC proc1()\n ENDPROC\nENDMODULE\n";
+    let task = truegrind_programs::rapid::Task::read(&[("a.mod", text)]);
+    let calls: Vec<_> =
+        task.listing.outside_calls.iter().map(|call| (call.name.as_str(), call.place.line)).collect();
+    assert_eq!(calls, [("\"Gone\"", 8), ("\"Cut\"+b", 9), ("\"Cut\"", 10), ("\"own\"", 11)]);
 }

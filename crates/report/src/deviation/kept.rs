@@ -29,8 +29,19 @@ const KINDS: [(MotionKind, &str); 6] = [
 
 /// The record of a report.
 pub fn kept(report: &PathReport) -> Value {
-    let PathReport { program, files, model, after, points, missing, differences, between, held_out_mm } =
-        report;
+    let PathReport {
+        program,
+        files,
+        model,
+        after,
+        points,
+        missing,
+        differences,
+        between,
+        held_out_mm,
+        turn_sigma_rad,
+        assumptions,
+    } = report;
     let mut last = [const { String::new() }; 3];
     let points: Vec<Value> = points.iter().map(|point| of_point(point, &mut last)).collect();
     json!({
@@ -39,6 +50,8 @@ pub fn kept(report: &PathReport) -> Value {
         "model": model,
         "achieved": *after == After::Achieved,
         "held_out_mm": held_out_mm.map(exact),
+        "turn_sigma_rad": turn_sigma_rad.map(exact),
+        "assumptions": assumptions,
         "missing": missing,
         "differences": differences,
         "between": between.as_ref().map(of_between),
@@ -55,10 +68,9 @@ pub fn from_kept(value: &Value) -> Option<PathReport> {
         files: serde_json::from_value(value["files"].clone()).ok()?,
         model: value["model"].as_str()?.to_owned(),
         after: if value["achieved"].as_bool()? { After::Achieved } else { After::PredictedRemainder },
-        held_out_mm: match &value["held_out_mm"] {
-            Value::Null => None,
-            number => Some(number.as_str()?.parse().ok()?),
-        },
+        held_out_mm: number_or_none(&value["held_out_mm"])?,
+        turn_sigma_rad: number_or_none(&value["turn_sigma_rad"])?,
+        assumptions: serde_json::from_value(value["assumptions"].clone()).ok()?,
         missing: serde_json::from_value(value["missing"].clone()).ok()?,
         differences: serde_json::from_value(value["differences"].clone()).ok()?,
         between: match &value["between"] {
@@ -67,6 +79,14 @@ pub fn from_kept(value: &Value) -> Option<PathReport> {
         },
         points: points.map(|point| to_point(point, &mut last)).collect::<Option<_>>()?,
     })
+}
+
+/// A number that may be missing; `None` if the value is neither.
+fn number_or_none(value: &Value) -> Option<Option<f64>> {
+    match value {
+        Value::Null => Some(None),
+        number => Some(Some(number.as_str()?.parse().ok()?)),
+    }
 }
 
 fn of_between(between: &BetweenTargets) -> Value {

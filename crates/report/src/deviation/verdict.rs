@@ -42,6 +42,8 @@ pub(super) fn verdict(reports: &[&PathReport], risk: Risk) -> PageVerdict {
         found.extend(of_certainty(report, risk));
         found.extend(remainder(report).map(|left| (Status::Warning, left.words(report))));
     }
+    let assumptions: BTreeSet<&String> = reports.iter().flat_map(|report| &report.assumptions).collect();
+    found.extend(assumptions.into_iter().map(|words| (Status::Warning, words.clone())));
     found.extend(missing(reports));
     let holds = |status: &Status| found.iter().any(|(of, _)| of == status);
     let mut status = [Status::Bad, Status::Warning].into_iter().find(holds).unwrap_or(Status::Good);
@@ -208,8 +210,12 @@ fn between_targets(report: &PathReport) -> Vec<Reason> {
 /// The orientation of the tool at the points of the cut.
 fn turns(report: &PathReport) -> Option<Reason> {
     let [before, after] = [BEFORE, AFTER].map(|side| report.largest_turn_rad(side).map(f64::to_degrees));
+    let sigma = report.turn_sigma_rad.map(f64::to_degrees);
+    let sigma = sigma.map_or_else(String::new, |deg| {
+        format!(", where a standard deviation (1σ) of at most {deg:.3}° is expected")
+    });
     let words = format!(
-        "{}: the orientation of the tool deviates by up to {:.3}° before, {:.3}° after",
+        "{}: the orientation of the tool deviates by up to {:.3}° before, {:.3}° after{sigma}",
         report.model, before?, after?
     );
     Some((Status::Good, words))

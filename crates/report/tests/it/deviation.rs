@@ -73,6 +73,8 @@ fn report(model: &str, points: Vec<PathPoint>) -> PathReport {
         differences: Vec::new(),
         between: None,
         held_out_mm: Some(0.46),
+        turn_sigma_rad: Some(0.002),
+        assumptions: Vec::new(),
     }
 }
 

@@ -197,6 +197,7 @@ impl Interpreter<'_, '_> {
         }
         match address_effect(name) {
             Some(AddressEffect::None) => {}
+            Some(_) if self.further_axis(&word).is_some() => block.flags.other_axes = true,
             Some(AddressEffect::Unmodelled(reason)) => block.unmodelled = Some(reason),
             Some(AddressEffect::OtherAxes) => block.flags.other_axes = true,
             // Handled by `tool_words`.
@@ -207,6 +208,14 @@ impl Interpreter<'_, '_> {
                 block.unknown_word = Some((text, Reason::UnknownWord));
             }
         }
+    }
+
+    /// The letter of the axis beside the arm that a word positions by itself: POS[U], POSA[V].
+    pub(super) fn further_axis(&self, word: &Word<'_>) -> Option<u8> {
+        let (first, end) = word.index.filter(|_| word.name.to_ascii_uppercase().starts_with(b"POS"))?;
+        let mut bytes = (first..end).flat_map(|token| self.tree.text(token));
+        let letter = bytes.find(|byte| byte.is_ascii_alphabetic())?.to_ascii_uppercase();
+        matches!(letter, b'U'..=b'W' | b'E').then_some(letter)
     }
 
     /// TOFFL=, TCARR=: the tool offsets deviate from the tool's data, or no longer do.

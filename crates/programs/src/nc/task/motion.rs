@@ -66,6 +66,11 @@ impl Interpreter<'_, '_> {
         self.state.corners.before = false;
         let mut motion = self.new_motion(block, name, kind);
         motion.own_reason = Some(reason);
+        // A path with which the tool may cut belongs to the cut of its neighbours: by tool and work offset.
+        if kind != MotionKind::Unknown || matches!(reason, Reason::UnsupportedPath | Reason::RoundedCorner) {
+            motion.tool = Some(self.tool());
+            motion.work_object = Some(self.work_object());
+        }
         let context = self.block_context(block, None);
         self.push(motion, context);
         self.state.preceding = Preceding::default();
@@ -446,12 +451,12 @@ impl Interpreter<'_, '_> {
         if !block.flags.other_axes || self.has_incremental_uvw() {
             return;
         }
-        let letter = |word: &Word<'_>| match word.name.to_ascii_uppercase().as_slice() {
+        let letter = |task: &Self, word: &Word<'_>| match word.name.to_ascii_uppercase().as_slice() {
             [letter @ (b'U'..=b'W' | b'E')] | [b'I', letter @ b'U'..=b'W'] => Some(char::from(*letter)),
-            _ => None,
+            _ => task.further_axis(word).map(char::from),
         };
         for word in &block.words {
-            if let Some(letter) = letter(word) {
+            if let Some(letter) = letter(self, word) {
                 let place = self.place(word.first);
                 self.listing.nc.other_axes.entry(letter).or_insert(place);
             }
@@ -464,7 +469,12 @@ impl Interpreter<'_, '_> {
             return;
         }
         if block.flags.opaque {
-            self.list_left(block, "?", Reason::Unreadable);
+            // What cannot be read may be words of a path, such as LinuxCNC's polar `@10 ^30`.
+            let kind = match mode {
+                MotionMode::Linear | MotionMode::Circular(_) => name_and_kind(mode, false).1,
+                _ => MotionKind::Unknown,
+            };
+            self.list_left_as(block, ("?", kind), Reason::Unreadable);
             self.invalidate_pose();
         } else if let Some(reason) = block.unmodelled {
             if reason == Reason::Transformed {
@@ -476,9 +486,11 @@ impl Interpreter<'_, '_> {
                 self.invalidate_pose();
             }
         } else if block.flags.other_axes {
-            self.list_left(block, "axes", Reason::ExternalOnly);
             if self.has_incremental_uvw() {
+                self.list_left(block, "axes", Reason::ExternalOnly);
                 self.invalidate_position();
+            } else {
+                self.without_moving(|task| task.list_left(block, "axes", Reason::ExternalOnly));
             }
         }
     }

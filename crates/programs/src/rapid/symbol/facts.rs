@@ -13,9 +13,8 @@ use crate::dataflow::Lattice;
 use crate::rapid::instruction::{self, INSTRUCTIONS, SideEffect};
 use crate::rapid::modal::switches_set_by;
 use crate::rapid::predefined;
-use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, parts};
+use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments};
 use crate::rapid::token::{Token, folded, same_name};
-use crate::tree::Child;
 
 /// What the statements of one body do themselves.
 #[derive(Default)]
@@ -102,10 +101,7 @@ impl Symbols {
                 self.for_each_write(tree, body.scope, node, &mut |write| facts.writes.push(write));
             }
             match kind {
-                Syntax::LateCall => {
-                    let name = parts(tree, node).nth(1);
-                    add_late_call(tree, (node, name), &mut facts);
-                }
+                Syntax::LateCall => add_late_call(tree, node, &mut facts),
                 Syntax::Call | Syntax::Function => self.add_call(tree, body, (node, kind), &mut facts),
                 // The condition may depend on another task.
                 Syntax::While => facts.effects.waits = true,
@@ -145,10 +141,7 @@ impl Symbols {
                 facts.add_switch_call(node);
                 facts.calls.extend_from_slice(callees);
             }
-            [] if is_call && predefined::calls_by_name(name) => {
-                let name = arguments(tree, node).find(|argument| !argument.optional);
-                add_late_call(tree, (node, name.and_then(|name| name.value)), facts);
-            }
+            [] if is_call && predefined::calls_by_name(name) => add_late_call(tree, node, facts),
             [] if predefined::effect(name).is_none() => {
                 (facts.effects.writes_anything, facts.effects.moves) = (true, true)
             }
@@ -233,14 +226,10 @@ impl Symbols {
 }
 
 /// A call by a computed name.
-fn add_late_call(tree: &RapidTree<'_>, (node, name): (u32, Option<Child>), facts: &mut BodyFacts) {
+fn add_late_call(tree: &RapidTree<'_>, node: u32, facts: &mut BodyFacts) {
     (facts.effects.writes_anything, facts.effects.moves) = (true, true);
     facts.add_switch_call(node);
-    // CallByVar appends a number to the name that it is given.
-    let numbered = tree.nodes.kind(node) == Syntax::Call;
-    let given = arguments(tree, node).filter(|argument| !argument.optional).count();
-    let given = if numbered { 0 } else { given };
-    facts.late_calls.insert(NamePattern::of(tree, (name, given, numbered)));
+    facts.late_calls.insert(NamePattern::of_call(tree, node));
 }
 
 /// Whether a call counts a displacement from the robot's current position: PDispOn without \ExeP.

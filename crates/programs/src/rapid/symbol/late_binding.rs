@@ -6,7 +6,7 @@
 use std::collections::{BTreeSet, HashMap};
 
 use super::Symbols;
-use crate::rapid::syntax::{RapidTree, Syntax, parts};
+use crate::rapid::syntax::{RapidTree, RoutineHead, Syntax, arguments, parts};
 use crate::rapid::token::{Token, fold, folded};
 use crate::tree::Child;
 
@@ -24,7 +24,35 @@ pub(super) struct NamePattern {
     given: usize,
 }
 
+/// The expression from which a call computes the name of what it calls: `%...%`, or the first argument of CallByVar.
+pub(in crate::rapid) fn computed_name(tree: &RapidTree<'_>, call: u32) -> Option<Child> {
+    match tree.nodes.kind(call) {
+        Syntax::LateCall => parts(tree, call).nth(1),
+        _ => arguments(tree, call).find(|argument| !argument.optional)?.value,
+    }
+}
+
+impl Symbols {
+    /// Whether a procedure of the files may be what a call by a computed name calls.
+    pub(in crate::rapid) fn has_late_callee(&self, tree: &RapidTree<'_>, call: u32) -> bool {
+        !self.missing_callees.contains(&NamePattern::of_call(tree, call))
+    }
+}
+
+/// How many arguments a routine requires.
+fn required(head: &RoutineHead) -> usize {
+    head.parameters.iter().filter(|parameter| !parameter.optional).count()
+}
+
 impl NamePattern {
+    /// The pattern of what a call by a computed name calls.
+    pub(super) fn of_call(tree: &RapidTree<'_>, call: u32) -> NamePattern {
+        // CallByVar appends a number to the name that it is given.
+        let numbered = tree.nodes.kind(call) == Syntax::Call;
+        let given = arguments(tree, call).filter(|argument| !argument.optional).count();
+        NamePattern::of(tree, (computed_name(tree, call), if numbered { 0 } else { given }, numbered))
+    }
+
     /// The pattern of a string expression; `numbered` where a number is appended to it.
     pub(super) fn of(
         tree: &RapidTree<'_>,
@@ -87,9 +115,9 @@ pub(super) struct ProcedureIndex {
 impl ProcedureIndex {
     pub(super) fn of(symbols: &Symbols, trees: &[RapidTree<'_>]) -> ProcedureIndex {
         let mut forward = Vec::new();
-        let mut required = Vec::new();
+        let mut required_of = Vec::new();
         for (at, routine) in (0..).zip(&symbols.routines) {
-            required.push(routine.head.parameters.iter().filter(|parameter| !parameter.optional).count());
+            required_of.push(required(&routine.head));
             if routine.head.kind == Syntax::Proc {
                 let name = folded(trees[routine.file as usize].text(routine.head.name));
                 let module: Vec<u8> = routine.module.bytes().map(fold).collect();
@@ -102,7 +130,7 @@ impl ProcedureIndex {
             forward.iter().map(|(name, at)| (turned(name), *at)).collect();
         forward.sort_unstable();
         backward.sort_unstable();
-        ProcedureIndex { forward, backward, required, found: HashMap::new(), lists: Vec::new() }
+        ProcedureIndex { forward, backward, required: required_of, found: HashMap::new(), lists: Vec::new() }
     }
 
     /// The procedures that match any of the patterns: index into `lists`.
@@ -124,6 +152,15 @@ impl ProcedureIndex {
         self.lists.push(all);
         self.found.insert(least, list);
         list
+    }
+
+    /// The patterns that no procedure matches.
+    pub(super) fn without_match<'p>(
+        &self,
+        patterns: impl Iterator<Item = &'p NamePattern>,
+    ) -> BTreeSet<NamePattern> {
+        let all: BTreeSet<&NamePattern> = patterns.collect();
+        all.into_iter().filter(|one| self.match_one(one).is_empty()).cloned().collect()
     }
 
     fn match_one(&self, pattern: &NamePattern) -> Vec<u32> {

@@ -53,6 +53,7 @@ impl Symbols {
         self.record_writes_by_name(&all);
         let mut procedures = ProcedureIndex::of(self, trees);
         self.late_list = all.iter().map(|facts| procedures.matches(&facts.late_calls)).collect();
+        self.missing_callees = procedures.without_match(all.iter().flat_map(|facts| &facts.late_calls));
         self.interrupts = self.routines.iter().map(|routine| routine.head.kind == Syntax::Trap).collect();
         for facts in &all {
             let called = procedures.matches(&facts.interrupts) as usize;

@@ -13,6 +13,7 @@ use crate::rapid::evaluate::target::ValueOrigin;
 use crate::rapid::flow::AbstractState;
 use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
 use crate::rapid::predefined;
+use crate::rapid::symbol::late_binding::computed_name;
 use crate::rapid::symbol::{Body, SymbolKind};
 use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
 use crate::rapid::token::{Token, display, folded, same_name};
@@ -388,8 +389,17 @@ impl ListingBuilder<'_, '_> {
     pub(super) fn record_outside_call(&mut self, body: Body, node: u32) {
         let tree = &self.trees[body.file as usize];
         let name = tree.text(tree.nodes.first(node));
-        let is_outside = tree.nodes.kind(node) != Syntax::LateCall && predefined::effect(name).is_none();
-        if is_outside && self.symbols.callees(body.scope, name).is_empty() {
+        let late = tree.nodes.kind(node) == Syntax::LateCall;
+        if !late && !self.symbols.callees(body.scope, name).is_empty() {
+            return;
+        }
+        let name = if late || predefined::calls_by_name(name) {
+            let computed = computed_name(tree, node).filter(|_| !self.symbols.has_late_callee(tree, node));
+            computed.map(|name| text_of(tree, name))
+        } else {
+            Some(name).filter(|name| predefined::effect(name).is_none())
+        };
+        if let Some(name) = name {
             let place = self.place(body.file, tree.nodes.first(node));
             self.listing.outside_calls.push(OutsideCall { name: display(name), place });
         }
