@@ -336,14 +336,25 @@ pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)
     let dataset = imported(arguments, &bytes)?;
     // Free the text before the rows are processed.
     drop(bytes);
-    let dataset = measured(arguments, &robot, dataset)?;
+    let dataset = about_base(measured(arguments, &robot, dataset)?, &robot);
     Ok((robot, dataset))
+}
+
+/// With a note on the base that frames and programs are read in, where it is not that of the robot file.
+fn about_base(mut dataset: Dataset, robot: &Robot) -> Dataset {
+    dataset.notes.extend(robot.base_note.iter().map(|note| {
+        format!(
+            "{note}. Sensor frames and the positions of programs count from that base, where controllers have it: compare a position that the \
+             controller shows with `truegrind robots --check`"
+        )
+    }));
+    dataset
 }
 
 /// [`read`] for measurements that are already in memory.
 pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<(Robot, Dataset)> {
     let robot = inputs::robot(arguments.named())?;
-    let dataset = measured(arguments, &robot, imported(arguments, bytes)?)?;
+    let dataset = about_base(measured(arguments, &robot, imported(arguments, bytes)?)?, &robot);
     Ok((robot, dataset))
 }
 

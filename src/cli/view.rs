@@ -271,6 +271,8 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
         differences: Vec::new(),
         between: None,
         held_out_mm: Some(arm.calibrated.held_out.rmse),
+        turn_sigma_rad: None,
+        assumptions: Vec::new(),
     };
     let scene = PathScene {
         title: &format!("{name}: {} as estimated", arm.robot),

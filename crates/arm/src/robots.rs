@@ -44,6 +44,8 @@ pub struct Robot {
     pub model: Model,
     /// Warnings, one sentence each. In the catalogue only `hsr-jr680` has one: the ranges of its joints are not published.
     pub warnings: Vec<String>,
+    /// Where the base of the model is in that of the robot file, if it is another: the model's is on axis 1.
+    pub base_note: Option<String>,
 }
 
 impl Robot {
@@ -54,7 +56,7 @@ impl Robot {
             .map_err(|_| validation::link_count(sheet.link.len()).of(file, &sheet.name))?;
         let model = sheet.model(links);
         validation::check_published(&sheet, &model).map_err(|fault| fault.of(file, &sheet.name))?;
-        Ok(Self { sheet, model, warnings })
+        Ok(Self { sheet, model, warnings, base_note: None })
     }
 }
 

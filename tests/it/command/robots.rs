@@ -97,6 +97,31 @@ fn what_is_understood_of_a_file_is_told_and_goes_to_a_robot_file() {
     assert!(code == 2 && err.contains("arm.step"), "{err}");
 }
 
+/// An arm on a plate beside the base of its file: positions count from a base on axis 1, and whoever fits it is told.
+#[test]
+fn an_arm_beside_the_base_of_its_file_is_noted() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("arm.urdf"), URDF).unwrap();
+    fs::write(at.join("beside.urdf"), URDF.replace("xyz=\"0 0 0.29\"", "xyz=\"0.03 -0.02 0.29\"")).unwrap();
+    let recipe = "robot = \"arm.urdf\"\nseed = 1\n[poses]\nkind = \"random\"\ncount = 60\n[sensor]\nkind = \"position\"\n\
+                  frame = { position_mm = [1500.0, 0.0, 500.0], wxyz = [1, 0, 0, 0] }\nreflector_mm = [0, 0, 0]\n\
+                  [noise]\nsigma_mm = 0.02\n";
+    fs::write(at.join("recipe.toml"), recipe).unwrap();
+    let (code, _, err) = truegrind(at, &["simulate", "recipe.toml", "-o", "rows.csv"]);
+    assert_eq!(code, 0, "{err}");
+    let told = |robot: &str| {
+        let (_, out, err) = truegrind(at, &["identify", "rows.csv", "--robot", robot]);
+        let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        words(&format!("{out} {err}"))
+    };
+    let beside = told("beside.urdf");
+    assert!(beside.contains("lies at (30.000, -20.000, 0.000) mm in the file's"), "{beside}");
+    assert!(beside.contains("Sensor frames and the positions of programs count from that base"), "{beside}");
+    let plain = told("arm.urdf");
+    assert!(plain.contains("held-out") && !plain.contains("axis 1 is not"), "{plain}");
+}
+
 /// The class: a verb that takes a robot file, and not the links between which a URDF's arm is.
 #[test]
 #[cfg(feature = "visual")]

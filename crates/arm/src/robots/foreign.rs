@@ -154,9 +154,8 @@ fn robot(
     });
     let visuals = visuals.collect();
     let mut notes = foreign.notes.clone();
-    if let Some(note) = fitted.note() {
-        notes.push(note);
-    }
+    notes.extend(fitted.turn_note());
+    notes.extend(fitted.base_note());
     let mut map = Matrix6::identity();
     map[(0, 0)] = fitted.first_turn;
     if let Some(couplings) = &foreign.joint_map {
@@ -215,7 +214,7 @@ fn robot(
         },
         published: Vec::new(),
     };
-    let robot = Robot::new(sheet, file)?;
+    let robot = Robot { base_note: fitted.base_note(), ..Robot::new(sheet, file)? };
     check_against_file(&robot, &foreign, &fitted, &map, file)?;
     Ok((robot, notes, visuals))
 }

@@ -6,7 +6,8 @@
 
 mod effects;
 pub(super) mod facts;
-pub(super) mod late_binding;
+pub(super) mod computed_name;
+mod late_binding;
 mod position_reads;
 mod purity;
 mod solve;
@@ -14,8 +15,8 @@ mod writes;
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
+use self::computed_name::NamePattern;
 pub use self::effects::{SideEffects, Write, WriteKind};
-use self::late_binding::NamePattern;
 use self::position_reads::position_decisions;
 use super::instruction;
 use super::modal::{Switch, SwitchSet};
@@ -199,6 +200,11 @@ pub struct Symbols {
 }
 
 impl Symbols {
+    /// Whether a procedure of the files may be what a call by a computed name calls.
+    pub(super) fn has_late_callee(&self, tree: &RapidTree<'_>, call: u32) -> bool {
+        !self.missing_callees.contains(&NamePattern::of_call(tree, call))
+    }
+
     /// Builds the symbol table of the files of one task and solves its side effects.
     pub fn collect(trees: &[RapidTree<'_>]) -> Symbols {
         let mut symbols = Symbols { scopes: vec![Scope::default()], ..Symbols::default() };

@@ -127,7 +127,7 @@ proptest! {
             reason: Some("out of reach".into()),
         };
         let missing = Some(MissingMotions { motions: vec![left], lines: "line 3".into() });
-        let report = PathReport { program: "a.mod".into(), files: vec!["b.mod".into()], model: "arm".into(), after, points, missing, differences: vec!["line 3: MoveJ".into()], between, held_out_mm };
+        let report = PathReport { program: "a.mod".into(), files: vec!["b.mod".into()], model: "arm".into(), after, points, missing, differences: vec!["line 3: MoveJ".into()], between, held_out_mm, turn_sigma_rad: held_out_mm, assumptions: vec!["a tool without a turn".into()] };
         let text = serde_json::to_string(&kept(&report)).unwrap();
         let back = from_kept(&serde_json::from_str(&text).unwrap()).unwrap();
         // Signs of zeros too, which == does not tell.

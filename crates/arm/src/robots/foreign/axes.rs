@@ -205,12 +205,13 @@ fn last(flange: &Pose) -> (LinkSheet, Pose) {
 }
 
 impl FittedLinks {
+    /// Note on joint 1 where it turns about the base's z axis the other way.
+    pub(super) fn turn_note(&self) -> Option<String> {
+        (self.first_turn < 0.0).then(|| "joint 1 turns clockwise seen from above".to_owned())
+    }
+
     /// Note on the base where it is not the file's.
-    pub(super) fn note(&self) -> Option<String> {
-        let mut parts = Vec::new();
-        if self.first_turn < 0.0 {
-            parts.push("joint 1 turns clockwise seen from above".to_owned());
-        }
+    pub(super) fn base_note(&self) -> Option<String> {
         // No sign before zero.
         let rounded = |value: f64, to: f64| (value / to).round() * to + 0.0;
         let position = self.base.translation.vector.map(|mm| rounded(mm, 1e-3));
@@ -218,14 +219,15 @@ impl FittedLinks {
             let (r, p, y) = self.base.rotation.euler_angles();
             [r, p, y].map(|angle| rounded(angle.to_degrees(), 1e-4))
         };
-        if position.amax() >= SHOWN[0] || [roll, pitch, yaw].iter().any(|angle| angle.abs() >= SHOWN[1]) {
-            parts.push(format!(
+        let is_other =
+            position.amax() >= SHOWN[0] || [roll, pitch, yaw].iter().any(|angle| angle.abs() >= SHOWN[1]);
+        is_other.then(|| {
+            format!(
                 "axis 1 is not the z axis of the file's base: positions are those of a base on axis 1, which lies at \
                  ({:.3}, {:.3}, {:.3}) mm in the file's, turned by roll {roll:.4}°, pitch {pitch:.4}°, yaw {yaw:.4}°",
                 position.x, position.y, position.z
-            ));
-        }
-        (!parts.is_empty()).then(|| parts.join("; "))
+            )
+        })
     }
 
     /// +1 or −1 where axes 2 and 3 are parallel or antiparallel.

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::computed_name::NamePattern;
 use super::effects::{SideEffects, Write};
-use super::late_binding::NamePattern;
 use super::writes::literal_data_name;
 use super::{Body, Symbols};
 use crate::dataflow::Lattice;

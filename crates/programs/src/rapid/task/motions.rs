@@ -13,7 +13,7 @@ use crate::rapid::evaluate::target::ValueOrigin;
 use crate::rapid::flow::AbstractState;
 use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
 use crate::rapid::predefined;
-use crate::rapid::symbol::late_binding::computed_name;
+use crate::rapid::symbol::computed_name::computed_name;
 use crate::rapid::symbol::{Body, SymbolKind};
 use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
 use crate::rapid::token::{Token, display, folded, same_name};
