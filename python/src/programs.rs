@@ -447,6 +447,8 @@ fn corrected(
         differences: Vec::new(),
         between: None,
         held_out_mm: Some(arm.calibrated.held_out.rmse),
+        turn_sigma_rad: None,
+        assumptions: Vec::new(),
     };
     let unused = Used::by(listing, &cell).notes(&cell, surface.as_ref());
     let listing = listing.clone();

@@ -26,7 +26,7 @@ const MEET_MM: f64 = 1e-11;
 /// A first axis inclined by less is upright (rad): ten picometres at a distance of a metre.
 const SAME_RAD: f64 = 1e-14;
 
-/// What a place (mm) and an angle (°) have to be for the digits of [`FittedLinks::note`] to show them.
+/// What a place (mm) and an angle (°) have to be for the digits of [`FittedLinks::base_note`] to show them.
 const SHOWN: [f64; 2] = [5e-4, 5e-5];
 
 /// Fitted links and their frames.

@@ -210,7 +210,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// The letter of the axis beside the arm that a word positions by itself: POS[U], POSA[V].
+    /// The letter of the axis beside the arm that a word positions by itself: `POS[U]`, `POSA[V]`.
     pub(super) fn further_axis(&self, word: &Word<'_>) -> Option<u8> {
         let (first, end) = word.index.filter(|_| word.name.to_ascii_uppercase().starts_with(b"POS"))?;
         let mut bytes = (first..end).flat_map(|token| self.tree.text(token));
