@@ -158,15 +158,17 @@ impl<'s> Rewriter<'_, 's> {
         for axis in 0..3 {
             if slots.axes[axis].is_some() {
                 match (self.control.position[axis], self.control.intended[axis]) {
-                    (Some(current), Some(intended)) if conditional && current != intended => {
+                    (Some(current), Some(intended)) if conditional && differs(current, intended, 9) => {
                         self.control.position[axis] = Some(f64::NAN);
                     }
                     _ => (self.control.position[axis], self.control.intended[axis]) = (None, None),
                 }
             }
             if slots.angles[axis].is_some() {
-                let moved = self.control.angles[axis]
-                    .is_some_and(|current| Some(current) != context.start_angles[axis]);
+                // An angle that increments have brought back differs by rounding.
+                let moved = self.control.angles[axis].is_some_and(|current| {
+                    context.start_angles[axis].is_none_or(|intended| differs(current, intended, 9))
+                });
                 self.control.angles[axis] = (conditional && moved).then_some(f64::NAN);
             }
         }
