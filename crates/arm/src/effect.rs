@@ -92,8 +92,9 @@ pub enum Effect {
     SmoothCorrection(SmoothCorrection),
 }
 
-macro_rules! each {
-    ($self:expr, $e:ident => $body:expr) => {
+/// What each effect does that turns joints; `$still` of those that grow or move links instead.
+macro_rules! turning {
+    ($self:expr, $e:ident => $body:expr, $still:expr) => {
         match $self {
             Effect::JointCompliance($e) => $body,
             Effect::LumpedCompliance($e) => $body,
@@ -106,10 +107,21 @@ macro_rules! each {
             Effect::GearTwoJoints($e) => $body,
             Effect::JointCoupling($e) => $body,
             Effect::Backlash($e) => $body,
+            Effect::SmoothCorrection($e) => $body,
+            Effect::ThermalDrift(_) | Effect::AxisWobble(_) | Effect::BaseTilt(_) => $still,
+        }
+    };
+}
+
+/// The same of all.
+macro_rules! each {
+    ($self:expr, $e:ident => $body:expr) => {
+        match $self {
             Effect::ThermalDrift($e) => $body,
             Effect::AxisWobble($e) => $body,
             Effect::BaseTilt($e) => $body,
-            Effect::SmoothCorrection($e) => $body,
+            // Of these no other is left.
+            turning => turning!(turning, $e => $body, Default::default()),
         }
     };
 }
@@ -186,12 +198,13 @@ impl Effect {
         u: &MappedJoints,
         condition: &Condition,
     ) -> Vec<Vector6<f64>> {
-        each!(self, e => e.regressors(statics, u, condition))
+        let still = || vec![Vector6::zeros(); self.parameters().len()];
+        turning!(self, e => e.regressors(statics, u, condition), still())
     }
 
     /// Offset that the effect adds to the joint rotations (rad).
     pub fn offset(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> Vector6<f64> {
-        each!(self, e => e.offset(statics, u, condition))
+        turning!(self, e => e.offset(statics, u, condition), Vector6::zeros())
     }
 
     /// Adds [`Effect::offset`] for one row or several in lanes; `torque` from [`Statics::torques`].
@@ -257,7 +270,7 @@ impl Effect {
 
     /// Derivative of [`Effect::offset`] with respect to u.
     pub fn jacobian(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> Matrix6<f64> {
-        each!(self, e => e.jacobian(statics, u, condition))
+        turning!(self, e => e.jacobian(statics, u, condition), Matrix6::zeros())
     }
 
     /// The first frame of the chain that it moves against the rest, with the link that ends there; 0 is the base. `None` where it moves none.

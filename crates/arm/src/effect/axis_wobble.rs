@@ -4,14 +4,10 @@
 //! ω = (a cos 2θ + b sin 2θ) x + (c cos 2θ + d sin 2θ) y, about the origin of the joint's frame, and displaces it likewise where the axis
 //! tilts about another point. Once a turn it would be a link that is not straight.
 
-use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::chain::{Chain, cross};
-use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
-use crate::effect::statics::Statics;
-use crate::joints::MappedJoints;
 use crate::link_motion::LinkMotion;
 use truegrind_math::lanes::{Real, SinCos, sin_cos};
 
@@ -129,17 +125,5 @@ impl AxisWobble {
     pub(super) fn largest_mm(&self, extent_mm: f64) -> f64 {
         let sum = |values: &[f64; 4]| values.iter().map(|v| v.abs()).sum::<f64>();
         extent_mm * sum(&self.tilt_rad) + self.radial_mm.as_ref().map_or(0.0, sum)
-    }
-
-    pub(super) fn regressors(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
-        vec![Vector6::zeros(); self.parameters().len()]
-    }
-
-    pub(super) fn offset(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Vector6<f64> {
-        Vector6::zeros()
-    }
-
-    pub(super) fn jacobian(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Matrix6<f64> {
-        Matrix6::zeros()
     }
 }

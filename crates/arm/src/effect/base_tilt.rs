@@ -6,7 +6,6 @@
 //!
 //! In lanes Newton's method neglects its slopes with respect to the joints, some 1e-3, as those of compliance.
 
-use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::chain::{Chain, cross, minus};
@@ -213,17 +212,5 @@ impl BaseTilt {
             newton_metres(term) * (term.tilt_rad_per_nm.abs() * extent_mm + term.sway_mm_per_nm.abs())
         };
         self.term.iter().map(of).sum()
-    }
-
-    pub(super) fn regressors(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
-        vec![Vector6::zeros(); self.parameters().len()]
-    }
-
-    pub(super) fn offset(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Vector6<f64> {
-        Vector6::zeros()
-    }
-
-    pub(super) fn jacobian(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Matrix6<f64> {
-        Matrix6::zeros()
     }
 }

@@ -3,13 +3,10 @@
 //!
 //! Source: the first-order warm-up of industrial arms in Yin et al. 2014 (doi 10.1007/s00170-014-5902-y).
 
-use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
-use crate::effect::statics::Statics;
-use crate::joints::MappedJoints;
 
 /// Growth of the links.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,17 +56,5 @@ impl Thermal {
                 .map_or(0.0, |t| 1.0 - (-(t - self.start_h).max(0.0) / self.time_constant_h).exp()),
             condition.temperature_c.map_or(0.0, |t| t - self.reference_c),
         ]
-    }
-
-    pub(super) fn regressors(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
-        vec![Vector6::zeros(); 2]
-    }
-
-    pub(super) fn offset(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Vector6<f64> {
-        Vector6::zeros()
-    }
-
-    pub(super) fn jacobian(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Matrix6<f64> {
-        Matrix6::zeros()
     }
 }
