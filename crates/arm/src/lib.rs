@@ -3,7 +3,7 @@
 //! From what the log says to the flange:
 //!
 //! ```text
-//! logged joints → joint map (signs, couplings) → joint effects → links → flange
+//! logged joints → joint map (signs, couplings) → joint effects → links, some moved by effects → flange
 //! ```
 //!
 //! Three models of one arm are kept apart by name: *nominal* (the data sheet, which the controller computes with),
