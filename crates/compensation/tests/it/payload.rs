@@ -11,7 +11,7 @@ use truegrind_compensation::condition::other_load::is_other_load;
 use truegrind_compensation::condition::overload::stated_overload;
 use truegrind_compensation::condition::payload::payload_at;
 use truegrind_compensation::condition::warmth::growth_per_k;
-use truegrind_compensation::deviation::After;
+use truegrind_compensation::deviation::{After, PathReport};
 use truegrind_compensation::options::Options;
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind_programs::motion::Listing;
@@ -194,33 +194,33 @@ fn a_load_that_the_deflection_does_not_follow_is_counted() {
     assert!(!is_other_load(2.1, &arm) && is_other_load(0.0, &arm));
 }
 
+/// The deviations of a program that an estimated arm runs as its data sheet says.
+fn judged(arm: &Estimated, listing: &Listing, loads: Option<&Loads>) -> PathReport {
+    let task = VerificationTask {
+        original: listing,
+        rewritten: None,
+        cell: &Cell::default(),
+        surface: None,
+        program: "p",
+        name: "test",
+        after: After::PredictedRemainder,
+        tolerance_mm: 0.05,
+        loads: [loads, loads],
+    };
+    let nominal = super::nominal();
+    let acting =
+        ActingArm { nominal: &nominal, model: &arm.model, knowledge: Some(arm), condition: arm.condition };
+    verify(&task, &acting)
+}
+
 /// `deviation` gave no warning of such a load, and none of a tool vector without a turn.
 #[test]
 fn what_the_judged_deviations_rest_on_is_told() {
     let mut arm = super::estimated(super::perturbed(3, 1.0), &[truegrind_arm::model::Joints::zeros()]);
     let lump = Lump { frame: 3, axis: None, moment: None, factor: 1e-2 };
     arm.model.effects.push(Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump: vec![lump] }));
-    let assumptions = |arm: &Estimated, listing: &Listing, loads: Option<&Loads>| {
-        let judged = VerificationTask {
-            original: listing,
-            rewritten: None,
-            cell: &Cell::default(),
-            surface: None,
-            program: "p",
-            name: "test",
-            after: After::PredictedRemainder,
-            tolerance_mm: 0.05,
-            loads: [loads, loads],
-        };
-        let nominal = super::nominal();
-        let acting = ActingArm {
-            nominal: &nominal,
-            model: &arm.model,
-            knowledge: Some(arm),
-            condition: arm.condition,
-        };
-        verify(&judged, &acting).assumptions
-    };
+    let assumptions =
+        |arm: &Estimated, listing: &Listing, loads: Option<&Loads>| judged(arm, listing, loads).assumptions;
     let (task, loads) = grips("PROC main()\n m;\n m;\nENDPROC\n");
     let told = assumptions(&arm, &task.listing, Some(&loads));
     assert!(told.len() == 1 && told[0].starts_with("2 motions carry another load"), "{told:?}");
@@ -238,27 +238,7 @@ fn what_the_judged_deviations_rest_on_is_told() {
 fn the_turn_of_a_tool_has_a_standard_deviation() {
     let (task, _) = grips("PROC main()\n m;\nENDPROC\n");
     let mut arm = super::estimated(super::perturbed(3, 1.0), &[truegrind_arm::model::Joints::zeros()]);
-    let nominal = super::nominal();
-    let turn_sigma_rad = |arm: &Estimated| {
-        let judged = VerificationTask {
-            original: &task.listing,
-            rewritten: None,
-            cell: &Cell::default(),
-            surface: None,
-            program: "p",
-            name: "test",
-            after: After::PredictedRemainder,
-            tolerance_mm: 0.05,
-            loads: [None, None],
-        };
-        let acting = ActingArm {
-            nominal: &nominal,
-            model: &arm.model,
-            knowledge: Some(arm),
-            condition: arm.condition,
-        };
-        verify(&judged, &acting).turn_sigma_rad.unwrap()
-    };
+    let turn_sigma_rad = |arm: &Estimated| judged(arm, &task.listing, None).turn_sigma_rad.unwrap();
     arm.covariance.fill(0.0);
     assert_eq!(turn_sigma_rad(&arm), 0.0);
     // The zeros of joints 5 and 6, whose axes are perpendicular.
