@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use truegrind::arm::arm_file::ArmFile;
-use truegrind::arm::effect::Effect;
 use truegrind::arm::model::Model;
 use truegrind::calibration::measurement::simulation::Simulation;
 use truegrind::calibration::measurement::simulation::recipe::{Approach, Recipe};
@@ -53,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         sensor.name(),
         arguments.output.display()
     ));
-    let has_play = simulation.actual.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)));
+    let has_play = simulation.actual.effects.iter().any(|effect| effect.play_rad().is_some());
     if has_play && conditions.approach == Approach::Unknown {
         print_message(
             "note: the arm has backlash, but circumstances.approach is not stated: every reading is taken in the middle of the play",

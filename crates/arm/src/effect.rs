@@ -16,6 +16,7 @@ pub mod gear_ratio;
 pub mod coupling;
 pub mod two_joint_gear;
 pub mod backlash;
+pub mod loaded_backlash;
 pub mod thermal;
 pub mod axis_wobble;
 pub mod base_tilt;
@@ -37,6 +38,7 @@ use self::error_map::ErrorMap;
 use self::gear_ratio::GearRatio;
 use self::hardening::Hardening;
 use self::harmonic::Harmonic;
+use self::loaded_backlash::LoadedBacklash;
 use self::lumped_compliance::LumpedCompliance;
 use self::smooth_correction::SmoothCorrection;
 use self::thermal::Thermal;
@@ -82,6 +84,9 @@ pub enum Effect {
     JointCoupling(Coupling),
     /// Play that depends on the side from which the joint came.
     Backlash(Backlash),
+    /// The same where gravity closes the play.
+    #[serde(rename = "backlash-loaded")]
+    LoadedBacklash(LoadedBacklash),
     /// Links that grow with time or temperature.
     ThermalDrift(Thermal),
     /// An axis that wobbles in its bearing.
@@ -107,6 +112,7 @@ macro_rules! turning {
             Effect::GearTwoJoints($e) => $body,
             Effect::JointCoupling($e) => $body,
             Effect::Backlash($e) => $body,
+            Effect::LoadedBacklash($e) => $body,
             Effect::SmoothCorrection($e) => $body,
             Effect::ThermalDrift(_) | Effect::AxisWobble(_) | Effect::BaseTilt(_) => $still,
         }
@@ -138,7 +144,7 @@ impl Effect {
             Effect::GearRatio(_) => "gear-ratio",
             Effect::GearTwoJoints(_) => "gear-two-joints",
             Effect::JointCoupling(_) => "joint-coupling",
-            Effect::Backlash(_) => "backlash",
+            Effect::Backlash(_) | Effect::LoadedBacklash(_) => "backlash",
             Effect::ThermalDrift(_) => "thermal-drift",
             Effect::AxisWobble(_) => "axis-wobble",
             Effect::BaseTilt(_) => "base-tilt",
@@ -159,6 +165,7 @@ impl Effect {
             Effect::GearTwoJoints(e) => Some(e.joint),
             Effect::JointCoupling(e) => Some(e.joint),
             Effect::Backlash(e) => Some(e.joint),
+            Effect::LoadedBacklash(e) => Some(e.joint),
             Effect::AxisWobble(e) => Some(e.joint),
             Effect::LinkBending(_)
             | Effect::ThermalDrift(_)
@@ -178,6 +185,7 @@ impl Effect {
             || matches!(self, Effect::LinkBending(bending) if bending.frame.is_some())
             || matches!(self, Effect::JointStiffness(spring) if !spring.mass.is_empty())
             || matches!(self, Effect::TorquePowers(powers) if !powers.mass.is_empty())
+            || matches!(self, Effect::LoadedBacklash(play) if !play.mass.is_empty())
             || matches!(self, Effect::BaseTilt(tilt) if tilt.term.iter().any(|term| term.frame.is_some()))
     }
 
@@ -229,6 +237,7 @@ impl Effect {
             Effect::GearTwoJoints(e) => e.add_offset(u, out),
             Effect::JointCoupling(e) => e.add_offset(u, out),
             Effect::Backlash(e) => e.add_offset(condition, out),
+            Effect::LoadedBacklash(e) => e.add_offset(statics, u, torque, condition, out),
             Effect::SmoothCorrection(e) => e.add_offset(u, out),
             Effect::ThermalDrift(_) | Effect::AxisWobble(_) | Effect::BaseTilt(_) => {}
         }
@@ -251,6 +260,7 @@ impl Effect {
             | Effect::TorquePowers(_)
             | Effect::LinkBending(_)
             | Effect::Backlash(_)
+            | Effect::LoadedBacklash(_)
             | Effect::ThermalDrift(_)
             | Effect::AxisWobble(_)
             | Effect::BaseTilt(_) => {}
@@ -263,6 +273,7 @@ impl Effect {
             Effect::JointCompliance(_) => true,
             Effect::JointStiffness(spring) => spring.mass.is_empty(),
             Effect::TorquePowers(powers) => powers.mass.is_empty(),
+            Effect::LoadedBacklash(play) => play.mass.is_empty(),
             Effect::LinkBending(bending) => bending.frame.is_none(),
             _ => false,
         }
@@ -331,6 +342,23 @@ impl Effect {
             }
             Effect::BaseTilt(tilt) => [none, tilt.motion_slopes(statics, u, condition)],
             _ => [none; 2],
+        }
+    }
+
+    /// Its joint and play between the flanks (rad); `None` of an effect that is no backlash.
+    pub fn play_rad(&self) -> Option<(usize, f64)> {
+        match self {
+            Effect::Backlash(e) => Some((e.joint, e.play_rad)),
+            Effect::LoadedBacklash(e) => Some((e.joint, e.play_rad)),
+            _ => None,
+        }
+    }
+
+    /// What of that play the load leaves open (rad), so that the side of approach decides; 0 of an effect that is no backlash.
+    pub fn open_play_rad(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> f64 {
+        match self {
+            Effect::LoadedBacklash(e) => e.open_play_rad(statics, u, condition),
+            _ => self.play_rad().map_or(0.0, |(_, play)| play),
         }
     }
 

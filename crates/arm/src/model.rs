@@ -317,6 +317,18 @@ impl PreparedModel<'_> {
         }
     }
 
+    /// The play of each joint (rad) that no load closes at the controller's angles `q`: the side of approach decides where the link is in it.
+    pub fn open_plays_rad(&self, q: &Joints) -> [f64; 6] {
+        let mapped = self.model.mapped(q);
+        let mut out = [0.0; 6];
+        for effect in &self.model.effects {
+            if let (Some((joint, _)), Some(statics)) = (effect.play_rad(), &self.statics) {
+                out[joint] += effect.open_play_rad(statics, &mapped, &self.of_effects);
+            }
+        }
+        out
+    }
+
     /// Motions of links per unit of each parameter of effect `index`, about the base's origin; empty of an effect that moves none.
     pub fn link_motion_regressors(&self, index: usize, q: &Joints) -> Vec<LinkMotion<f64>> {
         let (Some(statics), Some(effect)) = (&self.statics, self.model.effects.get(index)) else {

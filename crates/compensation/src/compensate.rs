@@ -22,7 +22,6 @@ use crate::plan::single_precision::single_precision;
 use crate::plan::solved_program::SolvedProgram;
 use crate::plan::steps_to_left::StepsToLeft;
 use crate::risk::prepared_estimate::PreparedEstimate;
-use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::edit::EditError;
 use truegrind_programs::motion::{Listing, Mark, MotionKind, Reason};
@@ -93,8 +92,7 @@ pub fn compensate_prepared(
         RewriteOptions { mark, position_decimals: options.position_decimals, ..RewriteOptions::default() };
     let mut targets = SolvedProgram::of(listing, prepared, cell, options);
     let mut refused: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
-    let play =
-        arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_zero());
+    let play = arm.model.effects.iter().any(|effect| effect.play_rad().is_some() && !effect.is_zero());
     let mut round = 0;
     loop {
         let planned = targets.plan(&refused);

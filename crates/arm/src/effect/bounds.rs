@@ -19,6 +19,7 @@ const COMPLIANCE: Bound =
     Bound::new(-1.0, 1.0, "a compliance in rad/(N m), times kg where masses are lumped, within ±1");
 const MASS_KG: Bound = Bound::new(0.0, 1e5, "a mass in kg, not negative");
 const TORQUE_NM: Bound = Bound::new(1e-6, 1e6, "a torque in N m, above 0");
+const FRICTION_NM: Bound = Bound::new(0.0, 1e6, "a torque in N m, not negative");
 /// Run-out of a bearing.
 const RUN_OUT_MM: Bound = Bound::new(-10.0, 10.0, "a length in mm, within ±10");
 /// Sway of a base, lumped masses in it or not.
@@ -71,6 +72,12 @@ impl Effect {
             Effect::JointCoupling(e) => {
                 joint("driver", e.driver)?;
                 SHARE.check("factor", e.factor)
+            }
+            Effect::LoadedBacklash(e) => {
+                masses(e.joint, &e.mass)?;
+                FRICTION_NM.check("friction_nm", e.friction_nm)?;
+                TORQUE_NM.check("closing_nm", e.closing_nm)?;
+                OFFSET_RAD.check("play_rad", e.play_rad)
             }
             Effect::Backlash(e) => OFFSET_RAD.check("play_rad", e.play_rad),
             Effect::ThermalDrift(e) => thermal(e),

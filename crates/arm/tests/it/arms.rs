@@ -16,6 +16,7 @@ use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::hardening::Hardening;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::effect::joint_load::PointMass;
+use truegrind_arm::effect::loaded_backlash::LoadedBacklash;
 use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
 use truegrind_arm::effect::smooth_correction::SmoothCorrection;
 use truegrind_arm::effect::thermal::Thermal;
@@ -444,6 +445,12 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
         let (square_rad_per_nm2, cube_rad_per_nm3) = (3e-8, -1e-9);
         let powers = TorquePowers { joint: 2, mass, largest_nm, square_rad_per_nm2, cube_rad_per_nm3 };
         out.effects.extend([Effect::JointStiffness(spring), Effect::TorquePowers(powers)]);
+    }
+    for (joint, mass, friction_nm) in
+        [(1, Vec::new(), 10.0), (2, vec![PointMass { frame: 4, mass_kg: 1.0 }], 0.0)]
+    {
+        let play = LoadedBacklash { joint, mass, friction_nm, closing_nm: 10.0, play_rad: 2e-5 };
+        out.effects.push(Effect::LoadedBacklash(play));
     }
     out.effects.push(Effect::GearRatio(GearRatio { joint: 5, error: 2e-4 }));
     out.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));

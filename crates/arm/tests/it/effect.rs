@@ -7,7 +7,10 @@ use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::bending::Bending;
 use truegrind_arm::effect::compliance::Compliance;
+use truegrind_arm::effect::joint_load::PointMass;
+use truegrind_arm::effect::loaded_backlash::LoadedBacklash;
 use truegrind_arm::effect::thermal::Thermal;
+use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, MappedJoints, Model, PreparedModel};
 use truegrind_math::difference::jacobian;
 use truegrind_math::lanes::{AnyWidth, Instructions, SinCos, WIDTH, vectorised, with_instructions};
@@ -237,6 +240,50 @@ fn play_is_felt_between_the_two_sides() {
     let (above, below) =
         (model.at_condition(&from(1)).joint_rotations(&q), model.at_condition(&from(-1)).joint_rotations(&q));
     assert!(((above - below)[1] - 2e-3).abs() < 1e-18);
+}
+
+#[test]
+fn gravity_closes_a_play_where_it_exceeds_the_friction() {
+    let mut arm = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
+    let largest = 2.65;
+    let play = LoadedBacklash {
+        joint: 1,
+        mass: vec![PointMass { frame: 2, mass_kg: 1.0 }],
+        friction_nm: 0.3 * largest,
+        closing_nm: 0.02 * largest,
+        play_rad: 1e-3,
+    };
+    arm.effects.push(Effect::LoadedBacklash(play));
+    let from = |side: i8| Condition { approach: [0, side, 0, 0, 0, 0], ..Condition::default() };
+    for k in -40..=40 {
+        let angle = 0.04 * f64::from(k);
+        let q = Joints::new(0.0, angle, 0.0, 0.3, 0.8, 0.0);
+        let [above, middle, below] = [1, 0, -1].map(|side| {
+            let turned = (arm.at_condition(&from(side)).joint_rotations(&q) - q)[1];
+            assert!(turned.abs() <= 0.5e-3 * (1.0 + 1e-12));
+            turned
+        });
+        // The link falls forwards of the upright, and back behind it.
+        let share = angle.sin().abs() / 0.3;
+        if share > 1.5 {
+            for turned in [above, middle, below] {
+                assert!((turned - 0.5e-3 * angle.signum()).abs() < 1e-5, "{k}: {turned}");
+            }
+        } else if share < 0.5 {
+            assert!((above - below - 1e-3).abs() < 2e-5 && middle.abs() < 1e-5, "{k}: {above} {below}");
+        }
+        let (statics, u) = (arm.statics(), arm.mapped(&q));
+        let open = arm.effects[0].open_play_rad(&statics, &u, &from(0));
+        assert!((open - (above - below)).abs() < 1e-15);
+        // The solver follows the step.
+        let conditions = [1, 0, -1].map(from);
+        for condition in &conditions {
+            let target = arm.forward(&q, condition);
+            let inverse = Inverse::new(&arm, condition, &arm);
+            let solution = inverse.solve_near(&target, &q.map(|q| q + 1e-3)).unwrap();
+            assert!((solution.joints - q).amax() < 1e-8, "{k}");
+        }
+    }
 }
 
 /// The elastic curve of a beam, summed step by step under the moments of all that hangs beyond each step: nothing of the closed form.

@@ -14,9 +14,11 @@ use super::cause::Cause;
 use super::design::{Design, FullDesign, Linear, Projected};
 use super::extension::{Extended, Subject};
 use super::intervals::{self, ShiftScan};
+use super::nonlinear_springs;
 use super::order_spectrum;
 use super::score::{score_from, score_projected};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
+use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::effect::Effect;
 use truegrind_math::work::checkpoint;
 
@@ -75,13 +77,16 @@ impl<'a> CandidateScores<'a> {
             checkpoint();
             c.columns_of(&linear.slopes, size)
         };
+        let variants = variants(&catalogue.listed, subject, &fit);
         // Side by side, since each alone is partly in one thread.
-        let (whole, columns) =
-            rayon::join(|| linear.whole(), || catalogue.listed.par_iter().map(columns).collect::<Vec<_>>());
+        let (whole, columns) = rayon::join(
+            || linear.whole(),
+            || catalogue.listed.par_iter().chain(&variants).map(columns).collect::<Vec<_>>(),
+        );
         let design = &whole.design;
         let (projected, shifts) =
             rayon::join(|| design.project_all(&columns), || shifts(catalogue, subject, &fit, design));
-        let listed = catalogue.listed.iter().cloned().zip(projected);
+        let listed = catalogue.listed.iter().chain(&variants).cloned().zip(projected);
         let listed = listed.map(|(candidate, projected)| Entry { candidate, projected }).collect();
         let fine = catalogue.fine.iter().map(|f| f.iter().map(|_| OnceLock::new()).collect()).collect();
         Self { catalogue, subject, fit, linear, whole, listed, shifts, fine }
@@ -144,6 +149,25 @@ impl<'a> CandidateScores<'a> {
         }));
         out.par_extend(fine.par_iter().map(|entry| entry.score(design)));
     }
+}
+
+/// The springs and plays of a fit with other constants than the catalogue's.
+fn variants(listed: &[Arc<Candidate>], subject: &Subject<'_>, fit: &Extended) -> Vec<Arc<Candidate>> {
+    let of = |cause: &Cause| {
+        let Cause::Measurement(Disturbance { kind: Kind::Empirical(fault), profile, .. }) = cause else {
+            return Vec::new();
+        };
+        let same = listed.iter().filter(|c| c.cause.is_same_finding(cause));
+        let tried = same.map(|c| c.tried).fold(1.0, f64::max);
+        let candidate = |fault: EmpiricalFault| {
+            let variant = Disturbance::new(Kind::Empirical(fault), profile.clone());
+            let candidate =
+                Candidate::measurement(variant, &subject.observed.dataset, subject.nominal, subject.frames);
+            Arc::new(Candidate { tried, ..candidate })
+        };
+        nonlinear_springs::variants(*fault, subject).into_par_iter().map(candidate).collect::<Vec<_>>()
+    };
+    fit.causes.iter().flat_map(of).collect()
 }
 
 /// The kinds of shifts, to be scanned beside a fit with the design `design`.

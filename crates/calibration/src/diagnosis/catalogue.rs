@@ -638,7 +638,7 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     let wobble = |joint| [false, true].map(|radial| (EmpiricalFault::AxisWobble { joint, radial }, 2.0));
     out.extend((0..6).filter(|&joint| moves(joint)).flat_map(wobble));
     let exact = out.len();
-    out.extend(nonlinear_springs::faults(subject, &moves));
+    out.extend(nonlinear_springs::faults(subject, &moves, &columns.approach));
     out.extend(two_joint_gears(subject.nominal, &moves));
     if dataset.sensor == Sensor::Cable {
         out.extend([(EmpiricalFault::Pulley, 1.0), (drum(dataset), 1.0)]);

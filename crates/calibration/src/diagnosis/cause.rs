@@ -126,7 +126,9 @@ impl Cause {
         match self {
             Cause::Arm(Effect::JointCompliance(c)) => c.compliance_rad_per_nm >= 0.0,
             Cause::Arm(Effect::LinkBending(b)) => b.compliance_rad_per_nm >= 0.0,
-            Cause::Arm(Effect::Backlash(b)) => b.play_rad >= 0.0,
+            Cause::Arm(effect @ (Effect::Backlash(_) | Effect::LoadedBacklash(_))) => {
+                effect.play_rad().is_none_or(|(_, play)| play >= 0.0)
+            }
             Cause::Measurement(Disturbance {
                 kind:
                     Kind::Sag
@@ -282,7 +284,7 @@ impl Cause {
                 | Effect::TorquePowers(_)
                 | Effect::LinkBending(_),
             ) => Part::Spring,
-            Cause::Arm(Effect::Backlash(_))
+            Cause::Arm(Effect::Backlash(_) | Effect::LoadedBacklash(_))
             | Cause::Measurement(Disturbance {
                 kind: Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),
                 ..

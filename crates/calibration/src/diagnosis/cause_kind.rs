@@ -214,7 +214,7 @@ impl From<&Effect> for CauseKind {
             Effect::JointStiffness(_) | Effect::TorquePowers(_) => CauseKind::JointStiffness,
             Effect::GearTwoJoints(_) => CauseKind::GearTwoJoints,
             Effect::JointCoupling(_) => CauseKind::JointCoupling,
-            Effect::Backlash(_) => CauseKind::Backlash,
+            Effect::Backlash(_) | Effect::LoadedBacklash(_) => CauseKind::Backlash,
             Effect::ThermalDrift(_) => CauseKind::ThermalDrift,
             Effect::AxisWobble(_) => CauseKind::AxisWobble,
             Effect::BaseTilt(_) => CauseKind::BaseTilt,

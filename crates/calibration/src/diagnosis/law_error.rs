@@ -14,8 +14,10 @@ use truegrind_arm::parameter::Parameter;
 /// The share of an effect that its law does not follow; none of an effect that is what its law says, or any function of a joint.
 fn share(effect: &Effect) -> Option<f64> {
     match effect {
+        // Where its load closes it is known to some rows only.
+        Effect::LoadedBacklash(_) => Some(0.25),
         Effect::JointStiffness(_) | Effect::TorquePowers(_) | Effect::ThermalDrift(_) => Some(0.1),
-        Effect::GearTwoJoints(_) => Some(0.05),
+        Effect::GearTwoJoints(_) | Effect::LinkBending(_) => Some(0.05),
         Effect::BaseTilt(_) | Effect::AxisWobble(_) => Some(0.03),
         _ => None,
     }

@@ -14,7 +14,9 @@ use super::design::Design;
 use super::extension::{Extended, FreeParameters, Subject, fit, warm_fit};
 use super::held_out::FoldErrors;
 use super::levels;
+use super::nonlinear_springs;
 use super::score::{Score, score};
+use crate::measurement::sensor::disturbance::Kind;
 use crate::measurement::split::{self, Split};
 use truegrind_arm::effect::Effect;
 
@@ -236,6 +238,7 @@ fn next_candidate<'a>(
         .filter(|s| {
             !contains_cause(banned, &s.candidate.cause)
                 && !contains_cause(&scores.fit.causes, &s.candidate.cause)
+                && !has_law_of(&scores.fit.causes, &s.candidate.cause)
         })
         .filter(|s| scores.catalogue.is_significant(design, s, options.alpha))
         .peekable();
@@ -269,6 +272,17 @@ pub(super) fn contains_cause(causes: &[Cause], candidate: &Cause) -> bool {
     causes.iter().any(|c| match (c, candidate) {
         (Cause::Arm(a), Cause::Arm(b)) => is_same_effect(a, b),
         (Cause::Measurement(a), Cause::Measurement(b)) => a.kind == b.kind && a.profile == b.profile,
+        _ => false,
+    })
+}
+
+/// Whether `causes` contains the law of a spring or a play with any constants: two that differ in these alone would be the law of neither.
+fn has_law_of(causes: &[Cause], candidate: &Cause) -> bool {
+    causes.iter().any(|c| match (c, candidate) {
+        (Cause::Measurement(a), Cause::Measurement(b)) => match (&a.kind, &b.kind) {
+            (Kind::Empirical(a), Kind::Empirical(b)) => nonlinear_springs::is_one_law(*a, *b),
+            _ => false,
+        },
         _ => false,
     })
 }
@@ -326,6 +340,7 @@ fn review(scores: &CandidateScores<'_>, options: &Options, which: &[usize], how:
             let enough = own + how.margin;
             let best = scored.iter().take_while(|s| s.preference() > enough).find(|s| {
                 !contains_cause(&others, &s.candidate.cause)
+                    && !has_law_of(&others, &s.candidate.cause)
                     && catalogue.is_significant(&design, s, options.alpha)
             });
             let better = best.filter(|best| {

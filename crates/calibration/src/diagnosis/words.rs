@@ -183,6 +183,9 @@ pub fn describe_cause(
             "joint {joint} has {:.4}° of backlash between approaches from below and from above",
             value.to_degrees()
         ),
+        Cause::Arm(Effect::LoadedBacklash(play)) => {
+            is_closed_by_gravity(joint, value, (play.friction_nm * 1e3).round() as u32)
+        }
         Cause::Arm(Effect::ThermalDrift(t)) if t.growth == 0.0 => {
             format!("the links grow by {:.1} µm per metre and kelvin", t.growth_per_k * 1e6)
         }
@@ -317,10 +320,7 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
         ),
         EmpiricalFault::NonlinearStiffness { .. } => is_nonlinear(joint),
         EmpiricalFault::Hardening { .. } => stiffens(joint, value),
-        EmpiricalFault::LoadedPlay { .. } => format!(
-            "joint {joint} has {:.4}° of backlash that gravity closes: the load decides which flank of the gear carries it",
-            value.to_degrees()
-        ),
+        EmpiricalFault::LoadedPlay { friction_mnm, .. } => is_closed_by_gravity(joint, value, friction_mnm),
         EmpiricalFault::TwoJointGear { other, .. } => depends_on_two(joint, other),
         EmpiricalFault::AxisWobble { .. } => wobbles(joint, [0, 1, 2, 3].map(|k| value_of(parameters, k))),
         EmpiricalFault::Refraction => format!(
@@ -407,6 +407,21 @@ fn stiffens(joint: usize, deflection: f64) -> String {
     format!(
         "joint {joint} stiffens under its load: most of its deflection, up to {:.4}°, comes with the first newton metres",
         deflection.to_degrees()
+    )
+}
+
+/// Of a joint (from 1) with this play (rad), whose load must exceed a friction (mN m) to close it.
+fn is_closed_by_gravity(joint: usize, play: f64, friction_mnm: u32) -> String {
+    let below = match friction_mnm {
+        0 => String::new(),
+        _ => format!(
+            "; below {:.1} N m of it, held by friction, the side of approach does",
+            1e-3 * f64::from(friction_mnm)
+        ),
+    };
+    format!(
+        "joint {joint} has {:.4}° of backlash that gravity closes: the load decides which flank of the gear carries it{below}",
+        play.to_degrees()
     )
 }
 

@@ -142,7 +142,7 @@ pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
         Effect::GearRatio(_) | Effect::JointCoupling(_) => 3e-3,
         Effect::TorquePowers(powers) => torque_power_sigma(powers.mass.is_empty(), parameter),
         Effect::GearTwoJoints(_) => TWO_JOINT_SIGMA_RAD,
-        Effect::Backlash(_) | Effect::JointStiffness(_) => 0.2_f64.to_radians(),
+        Effect::Backlash(_) | Effect::LoadedBacklash(_) | Effect::JointStiffness(_) => 0.2_f64.to_radians(),
         Effect::ThermalDrift(_) => GROWTH_SIGMA,
         Effect::AxisWobble(_) => wobble_sigma(parameter),
         Effect::BaseTilt(tilt) => {

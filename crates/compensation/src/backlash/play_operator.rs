@@ -66,7 +66,10 @@ impl<'a> PlayOperator<'a> {
     /// Moves the motors and returns the flange pose.
     fn go(&mut self, motor: &Joints) -> Pose {
         self.take(motor);
-        let behind = Joints::from_fn(|j, _| self.behind[j] * self.play_rad[j].signum());
+        // What of the play no load closes.
+        let plays = self.arm.open_plays_rad(motor);
+        let open = |j: usize| if self.play_rad[j] == 0.0 { 0.0 } else { plays[j] / self.play_rad[j].abs() };
+        let behind = Joints::from_fn(|j, _| self.behind[j] * open(j));
         let link = motor + self.joints_of_gears * behind;
         self.arm.forward(&link)
     }

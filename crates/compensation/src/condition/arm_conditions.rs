@@ -8,7 +8,6 @@ use nalgebra::{Matrix6, Vector3};
 
 use crate::backlash::sides::JointSides;
 use truegrind_arm::condition::Condition;
-use truegrind_arm::effect::Effect;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::Pose;
@@ -36,8 +35,8 @@ impl<'a> ArmConditions<'a> {
     pub(crate) fn new(model: &'a Model, nominal: &'a Model, base: &Condition) -> Self {
         let mut play_rad = [0.0; 6];
         for effect in &model.effects {
-            if let Effect::Backlash(backlash) = effect {
-                play_rad[backlash.joint] += backlash.play_rad;
+            if let Some((joint, play)) = effect.play_rad() {
+                play_rad[joint] += play;
             }
         }
         let sense = Matrix6::from_diagonal(&model.joint_map.diagonal().map(f64::signum));
@@ -90,10 +89,11 @@ impl<'a> ArmConditions<'a> {
         self.list[condition_index].arm()
     }
 
-    /// Link angles under a condition with motor joints `joints`, without compliance.
+    /// Link angles under a condition with motor joints `joints`, without what a load does: compliance, and the play that it closes.
     pub(crate) fn links(&self, condition_index: usize, joints: &Joints) -> Joints {
-        let sides = self.arm(condition_index).condition.approach;
-        joints + self.joints_of_gears * Joints::from_fn(|j, _| 0.5 * self.play_rad[j] * f64::from(sides[j]))
+        let arm = self.arm(condition_index);
+        let (plays, sides) = (arm.open_plays_rad(joints), arm.condition.approach);
+        joints + self.joints_of_gears * Joints::from_fn(|j, _| 0.5 * plays[j] * f64::from(sides[j]))
     }
 
     /// Position uncertainty of a point on the flange from joints of unknown backlash side: half the backlash of each, as
@@ -109,11 +109,11 @@ impl<'a> ArmConditions<'a> {
         if !(0..6).any(open) {
             return 0.0;
         }
-        let frames = arm.frames(joints);
+        let (frames, plays) = (arm.frames(joints), arm.open_plays_rad(joints));
         let point = (frames.last() * arm.model.flange * flange_from_tool).translation.vector;
         let square = |j: usize| {
             let lever = point - Vector3::from(frames.origin[j]);
-            (Vector3::from(frames.z[j]).cross(&lever) * (0.5 * self.play_rad[j])).norm_squared()
+            (Vector3::from(frames.z[j]).cross(&lever) * (0.5 * plays[j])).norm_squared()
         };
         (0..6).filter(|&j| open(j)).map(square).sum::<f64>().sqrt()
     }

@@ -38,6 +38,7 @@ fn stands_alike_after_a_turn(arm: &Estimated, joint: usize) -> bool {
             | Effect::LinkBending(_)
             | Effect::GearTwoJoints(_)
             | Effect::Backlash(_)
+            | Effect::LoadedBacklash(_)
             | Effect::ThermalDrift(_)
             | Effect::AxisWobble(_)
             | Effect::BaseTilt(_) => true,

@@ -2,11 +2,15 @@
 //! controller's joints in small steps, and each link is moved by the flank against which it lies (the play operator): θ rests
 //! until q − b/2 or q + b/2 reaches it.
 
+use std::cell::Cell as Count;
+
 use nalgebra::{Point3, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::compliance::Compliance;
+use truegrind_arm::effect::joint_load::PointMass;
+use truegrind_arm::effect::loaded_backlash::LoadedBacklash;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
@@ -42,7 +46,7 @@ fn worn(seed: u64) -> Model {
 
 fn without_play(arm: &Model) -> Model {
     let mut arm = arm.clone();
-    arm.effects.retain(|effect| !matches!(effect, Effect::Backlash(_)));
+    arm.effects.retain(|effect| effect.play_rad().is_none());
     arm
 }
 
@@ -90,6 +94,16 @@ struct Passed {
 
 /// Runs a program in small steps. `part_from`: the first motion with the part in the gripper.
 fn run(listing: &Listing, arm: &Model, part_from: usize) -> Vec<Passed> {
+    run_loaded(listing, arm, part_from, &|_| [None; 6])
+}
+
+/// The same where loads close the play of some joints: `flank` says to which side (−1, 1) they do at link angles.
+fn run_loaded(
+    listing: &Listing,
+    arm: &Model,
+    part_from: usize,
+    flank: &dyn Fn(&Joints) -> [Option<f64>; 6],
+) -> Vec<Passed> {
     let sheet = nominal();
     let controller = Inverse::new(&sheet, &Condition::default(), &sheet);
     let stiff = without_play(arm);
@@ -128,6 +142,11 @@ fn run(listing: &Listing, arm: &Model, part_from: usize) -> Vec<Passed> {
                 _ => start.lerp(&end, s),
             };
             link = Joints::from_fn(|j, _| link[j].clamp(near[j] - half[j], near[j] + half[j]));
+            for (j, side) in flank(&link).iter().enumerate() {
+                if let Some(side) = side {
+                    link[j] = near[j] + side * half[j];
+                }
+            }
             let posed = if m < part_from { &light } else { &heavy };
             let tip = posed.forward(&link) * tool * Point3::origin();
             out.push(Passed { motion: m, end: k == steps, tip });
@@ -374,9 +393,71 @@ fn steps_smaller_than_the_play_are_right_too() {
     }
 }
 
+/// Where gravity closes the play of shoulder and elbow, and where friction holds it, the corrected program leaves nothing, and plain
+/// backlash in its place does.
+#[test]
+fn play_that_gravity_closes_is_corrected() {
+    let text = source();
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let meant = intended(&text);
+    // A lump before the joint: the shoulder is always loaded, the elbow along a part of the way, the wrist never.
+    let loads = [(1, 2, 0.5), (2, 4, 2.8), (4, 6, 0.45)];
+    let mass = |frame| vec![PointMass { frame, mass_kg: 1.0 }];
+    for seed in 0..3 {
+        let plain = stiff(&worn(seed));
+        let mut arm = plain.clone();
+        for effect in &mut arm.effects {
+            let Some((joint, play_rad)) = effect.play_rad() else { continue };
+            if let Some(&(_, frame, friction_nm)) = loads.iter().find(|(of, ..)| *of == joint) {
+                let mass = mass(frame);
+                *effect = Effect::LoadedBacklash(LoadedBacklash {
+                    joint,
+                    mass,
+                    friction_nm,
+                    closing_nm: 1e-4,
+                    play_rad,
+                });
+            }
+        }
+        // The torque from the place of the lump alone: its lever about the axis, in the arm's own frames.
+        let rigid = without_play(&arm);
+        let rigid = rigid.at_condition(&Condition::default());
+        let torque = |link: &Joints, joint: usize, frame: usize| {
+            let frames = rigid.frames(link);
+            let lever = (Vector3::from(frames.origin[frame]) - Vector3::from(frames.origin[joint])) * 1e-3;
+            lever.cross(&(rigid.model.gravity * 9.80665)).dot(&Vector3::from(frames.z[joint]))
+        };
+        let closed = Count::new([0_usize; 2]);
+        let flank = |link: &Joints| {
+            let mut out = [None; 6];
+            for (joint, frame, friction_nm) in loads {
+                let torque = torque(link, joint, frame);
+                let is_closed = torque.abs() > friction_nm;
+                out[joint] = is_closed.then(|| torque.signum());
+                let mut counts = closed.get();
+                counts[usize::from(is_closed)] += usize::from(joint == 2);
+                closed.set(counts);
+            }
+            out
+        };
+        let worst = |model: &Model| {
+            let (_, program) = rewrite(&text, model, &options(5.0, Some(task.loads())));
+            let passed = run_loaded(&Task::read(&[("p.mod", &program)]).listing, &arm, 6, &flank);
+            let ends = passed.iter().filter(|p| p.end && p.motion > 2);
+            ends.map(|p| (p.tip.coords - meant[p.motion]).norm()).fold(0.0, f64::max)
+        };
+        let right = worst(&arm);
+        let [open, shut] = closed.get();
+        assert!(open > 200 && shut > 200, "the elbow is held in {open} steps and loaded in {shut}");
+        assert!(right < 2e-3, "{right} mm are left");
+        let sides_alone = worst(&plain);
+        assert!(sides_alone > 0.05, "as plain backlash {sides_alone} mm are left");
+    }
+}
+
 /// The same arm without compliance.
 fn stiff(arm: &Model) -> Model {
     let mut arm = arm.clone();
-    arm.effects.retain(|effect| matches!(effect, Effect::Backlash(_)));
+    arm.effects.retain(|effect| effect.play_rad().is_some());
     arm
 }

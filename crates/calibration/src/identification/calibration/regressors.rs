@@ -25,8 +25,7 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
     if !fault.rotates_joints() {
         return Vec::new();
     }
-    let is_step = matches!(fault, EmpiricalFault::LoadedPlay { .. });
-    if let Some(effect) = fault.effect().filter(|_| !is_step) {
+    if let Some(effect) = fault.effect() {
         return effect_rotations(&effect, dataset, model);
     }
     let rows = &dataset.rows;
@@ -57,14 +56,6 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 out
             })
             .collect(),
-        EmpiricalFault::LoadedPlay { joint, load, .. } => {
-            let torques = torques_under(dataset, model, load);
-            let mut out = none();
-            // A joint yields along its torque, so a play of p puts its link p/2 from the middle on that side.
-            let flank = |t: f64| if t == 0.0 { 0.0 } else { 0.5 * t.signum() };
-            out[joint] = Some(torques.iter().map(|t| flank(t[joint])).collect());
-            vec![out]
-        }
         _ => Vec::new(),
     }
 }
@@ -75,7 +66,8 @@ fn effect_rotations(effect: &Effect, dataset: &Dataset, model: &Model) -> Vec<[O
     let statics = Model { effects: Vec::new(), ..model.clone() }.statics();
     let mut out: Vec<[Option<Vec<f64>>; 6]> = vec![Default::default(); effect.parameters().len()];
     for row in dataset.rows.iter() {
-        let turns = effect.regressors(&statics, &model.mapped(&row.joints), &row.condition);
+        let condition = model.gear_condition(&row.condition);
+        let turns = effect.regressors(&statics, &model.mapped(&row.joints), &condition);
         for (column, turn) in out.iter_mut().zip(turns) {
             column[joint].get_or_insert_default().push(turn[joint]);
         }

@@ -10,6 +10,7 @@ use truegrind_arm::effect::axis_wobble::AxisWobble;
 use truegrind_arm::effect::base_tilt::{BaseTilt, TiltTerm};
 use truegrind_arm::effect::hardening::Hardening;
 use truegrind_arm::effect::joint_load::PointMass;
+use truegrind_arm::effect::loaded_backlash::LoadedBacklash;
 use truegrind_arm::effect::torque_powers::TorquePowers;
 use truegrind_arm::effect::two_joint_gear::TwoJointGear;
 
@@ -21,24 +22,33 @@ pub enum AssumedLoad {
     Masses,
     /// 1 kg at the origin of a frame, 1 to 6.
     Frame(u8),
-    /// 1 kg divided between elbow and wrist, as on the arms of the catalogue whose masses are known.
-    ElbowAndWrist,
+    /// 1 kg divided between the origins of two frames.
+    Between {
+        /// The nearer frame, 1 to 6.
+        near: u8,
+        /// The farther one.
+        far: u8,
+        /// What of it is at the farther one (%).
+        far_percent: u8,
+    },
 }
 
-/// Share at the wrist, the origin of frame 4, of a load whose rest is at the elbow, that of frame 2. Of IRB 120, TX60 and UR10, each mass
-/// divided by the lever rule.
-const AT_WRIST: f64 = 0.2;
-
 impl AssumedLoad {
+    /// Divided between elbow and wrist as on IRB 120, TX60 and UR10, whose masses are known, each mass divided by the lever rule.
+    pub const ELBOW_AND_WRIST: Self = AssumedLoad::Between { near: 2, far: 4, far_percent: 20 };
+
     /// The masses where they are assumed; none where they are those of the arm.
     pub fn masses(self) -> Vec<PointMass> {
         match self {
             AssumedLoad::Masses => Vec::new(),
             AssumedLoad::Frame(frame) => vec![PointMass { frame: usize::from(frame), mass_kg: 1.0 }],
-            AssumedLoad::ElbowAndWrist => vec![
-                PointMass { frame: 2, mass_kg: 1.0 - AT_WRIST },
-                PointMass { frame: 4, mass_kg: AT_WRIST },
-            ],
+            AssumedLoad::Between { near, far, far_percent } => {
+                let at_far = 0.01 * f64::from(far_percent);
+                vec![
+                    PointMass { frame: usize::from(near), mass_kg: 1.0 - at_far },
+                    PointMass { frame: usize::from(far), mass_kg: at_far },
+                ]
+            }
         }
     }
 }
@@ -99,14 +109,17 @@ pub enum EmpiricalFault {
         /// The torque (mN m), of that load.
         bend_mnm: u32,
     },
-    /// A joint (0-based) whose play its load closes: the flank that bears changes where the static torque changes its sign.
+    /// A joint (0-based) whose play its load closes: the flank that bears changes where the static torque changes its sign, or, beside a
+    /// friction, where the torque exceeds this; below, the side of approach decides.
     LoadedPlay {
         /// The joint.
         joint: usize,
         /// Its load.
         load: AssumedLoad,
-        /// The torque (mN m), of that load, that counts as closing half of it in a program.
-        closed_mnm: u32,
+        /// The torque of the friction (mN m), of that load; 0 without.
+        friction_mnm: u32,
+        /// The torque (mN m), of that load, over which it closes.
+        closing_mnm: u32,
     },
     /// A joint error with harmonics of the sum and the difference of multiples of its angle and of another joint's.
     TwoJointGear {
@@ -265,14 +278,9 @@ impl EmpiricalFault {
         )
     }
 
-    /// The effect that a model file has for it, at size 0; `None` of faults in the measurement. Play that a load closes becomes a spring that
-    /// stiffens at once: a program needs a slope where the fault has a step.
+    /// The effect that a model file has for it, at size 0; `None` of faults in the measurement.
     pub fn effect(self) -> Option<Effect> {
         let newton_metres = |milli: u32| f64::from(milli.max(1)) * 1e-3;
-        let hardening = |joint: usize, load: AssumedLoad, half_mnm: u32| {
-            let half_nm = newton_metres(half_mnm);
-            Effect::JointStiffness(Hardening { joint, mass: load.masses(), half_nm, deflection_rad: 0.0 })
-        };
         Some(match self {
             EmpiricalFault::NonlinearStiffness { joint, load, largest_mnm } => {
                 Effect::TorquePowers(TorquePowers {
@@ -283,8 +291,21 @@ impl EmpiricalFault {
                     cube_rad_per_nm3: 0.0,
                 })
             }
-            EmpiricalFault::Hardening { joint, load, bend_mnm } => hardening(joint, load, bend_mnm),
-            EmpiricalFault::LoadedPlay { joint, load, closed_mnm } => hardening(joint, load, closed_mnm),
+            EmpiricalFault::Hardening { joint, load, bend_mnm } => Effect::JointStiffness(Hardening {
+                joint,
+                mass: load.masses(),
+                half_nm: newton_metres(bend_mnm),
+                deflection_rad: 0.0,
+            }),
+            EmpiricalFault::LoadedPlay { joint, load, friction_mnm, closing_mnm } => {
+                Effect::LoadedBacklash(LoadedBacklash {
+                    joint,
+                    mass: load.masses(),
+                    friction_nm: f64::from(friction_mnm) * 1e-3,
+                    closing_nm: newton_metres(closing_mnm),
+                    play_rad: 0.0,
+                })
+            }
             EmpiricalFault::TwoJointGear { joint, other, orders } => {
                 Effect::GearTwoJoints(TwoJointGear::still(joint, other, orders))
             }

@@ -12,6 +12,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::compliance::Compliance;
+use truegrind_arm::effect::loaded_backlash::LoadedBacklash;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::Parameter;
 use truegrind_arm::robots;
@@ -406,10 +407,10 @@ fn a_link_that_bends_is_told_from_its_joints() {
     assert!(found.estimated.model.effects.iter().any(|effect| matches!(effect, Effect::LinkBending(_))));
 }
 
-/// Play that gravity closes follows the sign of the torque, not the side of approach: it is written as a spring that stiffens at once.
+/// Play that gravity closes follows the sign of the torque, not the side of approach.
 #[test]
 fn play_that_its_load_closes_is_told_and_written() {
-    let hidden = [Hidden::LoadedPlay { joint: 2, play_rad: 0.0015, closed_nm: 0.05 }];
+    let hidden = [Hidden::LoadedPlay { joint: 2, play_rad: 0.0015, closed_nm: 0.05, friction_nm: 0.0 }];
     let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 81)).dataset);
     let play = found.diagnosis.findings.iter().find(|f| f.effect == "backlash").unwrap();
     assert_eq!((play.joints.as_deref(), play.confidence), (Some(&[3][..]), Confidence::Identified));
@@ -418,19 +419,42 @@ fn play_that_its_load_closes_is_told_and_written() {
     assert!((size.value - 0.0015).abs() < 4e-4, "{size:?}");
     assert!(play.remedy.contains("gear mesh"), "{}", play.remedy);
     assert_eq!(play.corrected, Some(true));
-    let flanks = found.estimated.model.effects.iter().find_map(|effect| match effect {
-        Effect::JointStiffness(spring) if spring.joint == 2 => Some(spring.deflection_rad),
-        _ => None,
-    });
-    assert!((flanks.unwrap() - 0.00075).abs() < 2e-4, "{flanks:?}");
+    let written = loaded_backlash(&found);
+    assert!((written.play_rad - 0.0015).abs() < 4e-4, "{written:?}");
     let backlash = |effect: &Effect| matches!(effect, Effect::Backlash(_));
     assert!(!found.estimated.model.effects.iter().any(backlash));
+}
+
+fn loaded_backlash(found: &Diagnosed) -> LoadedBacklash {
+    let of_joint = |effect: &Effect| match effect {
+        Effect::LoadedBacklash(play) if play.joint == 2 => Some(play.clone()),
+        _ => None,
+    };
+    found.estimated.model.effects.iter().find_map(of_joint).expect("a play that a load closes")
+}
+
+/// Below the friction the side of approach decides: the play has its size, and the friction its share of the largest torque.
+#[test]
+fn friction_holds_a_play_that_its_load_would_close() {
+    for share in [0.15, 0.3] {
+        // The forearm of 3 kg reaches 0.3 m: some 5 N m where it is level.
+        let hidden =
+            [Hidden::LoadedPlay { joint: 2, play_rad: 0.0012, closed_nm: 0.02, friction_nm: share * 5.0 }];
+        let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 600, 85)).dataset);
+        let play = &identified(&found)[0];
+        assert_eq!((play.effect.as_str(), play.joints.as_deref()), ("backlash", Some(&[3][..])));
+        assert!(play.cause.contains("held by friction"), "{}", play.cause);
+        let written = loaded_backlash(&found);
+        assert!((written.play_rad - 0.0012).abs() < 1e-4, "{written:?}");
+        let largest_nm = written.closing_nm / 0.02;
+        assert!((written.friction_nm / largest_nm - share).abs() < 0.05, "{written:?}");
+    }
 }
 
 /// The same, closed by half a newton metre, is a spring that stiffens: neither a gear nor a flank.
 #[test]
 fn a_spring_that_stiffens_is_no_play() {
-    let hidden = [Hidden::LoadedPlay { joint: 2, play_rad: 0.0015, closed_nm: 0.5 }];
+    let hidden = [Hidden::LoadedPlay { joint: 2, play_rad: 0.0015, closed_nm: 0.5, friction_nm: 0.0 }];
     let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 83)).dataset);
     let spring = &identified(&found)[0];
     assert_eq!((spring.effect.as_str(), spring.joints.as_deref()), ("joint-stiffness", Some(&[3][..])));

@@ -43,6 +43,8 @@ pub enum Hidden {
         joint: usize,
         play_rad: f64,
         closed_nm: f64,
+        /// Below this torque friction holds the link on the flank of its side of approach.
+        friction_nm: f64,
     },
     /// The link from this joint to the next bends like a beam; its end sags by this where it sags most.
     Bending {
@@ -464,8 +466,14 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                         let sense = arm.joint_map[(*joint, *joint)].signum();
                         turned[*joint] += 0.5 * play_rad * sense * f64::from(approach[*joint]);
                     }
-                    Hidden::LoadedPlay { joint, play_rad, closed_nm } => {
-                        turned[*joint] += 0.5 * play_rad * (arm.torque(&u, *joint, 0.0) / closed_nm).tanh();
+                    Hidden::LoadedPlay { joint, play_rad, closed_nm, friction_nm } => {
+                        let torque = arm.torque(&u, *joint, 0.0);
+                        let flank = if torque.abs() < *friction_nm {
+                            arm.joint_map[(*joint, *joint)].signum() * f64::from(approach[*joint])
+                        } else {
+                            (torque / closed_nm).tanh()
+                        };
+                        turned[*joint] += 0.5 * play_rad * flank;
                     }
                     Hidden::LostCounts { joint, until, rad } if i <= *until => turned[*joint] += rad,
                     Hidden::Range { mm } => range += mm,

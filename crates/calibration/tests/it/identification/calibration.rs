@@ -152,7 +152,12 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
         EmpiricalFault::Hardening { joint: 2, load: AssumedLoad::Frame(4), bend_mnm: 300 },
         EmpiricalFault::Range { from_mm: 1000, to_mm: 3000 },
         EmpiricalFault::Refraction,
-        EmpiricalFault::LoadedPlay { joint: 1, load: AssumedLoad::Frame(4), closed_mnm: 100 },
+        EmpiricalFault::LoadedPlay {
+            joint: 1,
+            load: AssumedLoad::Frame(4),
+            friction_mnm: 300,
+            closing_mnm: 200,
+        },
         EmpiricalFault::TwoJointGear { joint: 2, other: 3, orders: [1, 1] },
         EmpiricalFault::TwoJointGear { joint: 4, other: 5, orders: [2, 1] },
         EmpiricalFault::AxisWobble { joint: 2, radial: true },
