@@ -473,7 +473,7 @@ impl<'a> Half<'a> {
                 let changed = apart > chance && apart > CHANGED * CHANGED * lambda(before);
                 let cause = &tried.candidate.cause;
                 let recovered = if cause.rows().is_some() {
-                    self.recovers_shift(tried, &design, &score)
+                    self.recovers_shift(tried, own, &design, &score)
                 } else {
                     let is_of = |s: &WithColumns, cause: &Cause| s.candidate.cause.is_same_finding(cause);
                     let same = selected.iter().any(|s| is_of(s, cause));
@@ -490,8 +490,15 @@ impl<'a> Half<'a> {
             .collect()
     }
 
-    /// Whether a shift is recovered in the same rows.
-    fn recovers_shift(&self, tried: &WithColumns, design: &Design, score: &Score) -> bool {
+    /// Whether a shift is recovered in the same rows, or, beside others of its kind among the causes `own`, which are free, at the rows where it
+    /// alone changes the level: of three levels two shifts are known by each pair of them.
+    fn recovers_shift(
+        &self,
+        tried: &WithColumns,
+        own: &[WithColumns],
+        design: &Design,
+        score: &Score,
+    ) -> bool {
         let Some([from, to]) = tried.candidate.cause.rows() else { return false };
         let Cause::Measurement(disturbance) = &tried.candidate.cause else { return false };
         if !(score.evidence > 0.0) {
@@ -516,7 +523,26 @@ impl<'a> Half<'a> {
             let n = self.numbers.len();
             let (others, rest) = (n - mine, best.to + 1 - best.from - shared);
             let complement = rest as f64 / (others + (best.to + 1 - best.from) - rest).max(1) as f64;
-            shared as f64 / both.max(1) as f64 >= OVERLAP || complement >= OVERLAP
+            let changes = |from: usize, to: usize| {
+                let row = |number: usize| self.numbers.partition_point(|n| *n < number);
+                [row(from), row(to + 1)]
+            };
+            let of_others: Vec<usize> = own
+                .iter()
+                .filter_map(|other| match &other.candidate.cause {
+                    Cause::Measurement(d) if d.kind == disturbance.kind => other.candidate.cause.rows(),
+                    _ => None,
+                })
+                .filter(|rows| *rows != [from, to])
+                .flat_map(|[from, to]| changes(from, to))
+                .collect();
+            let near = |at: usize, row: usize| 2.0 * at.abs_diff(row) as f64 <= (1.0 - OVERLAP) * mine as f64;
+            let alone = |at: &usize| *at > 0 && *at < n && !of_others.contains(at);
+            let mut alone = changes(from, to).into_iter().filter(alone).peekable();
+            let is_found = !of_others.is_empty()
+                && alone.peek().is_some()
+                && alone.all(|at| near(at, best.from) || near(at, best.to + 1));
+            shared as f64 / both.max(1) as f64 >= OVERLAP || complement >= OVERLAP || is_found
         })
     }
 

@@ -24,6 +24,8 @@ pub(super) struct Confounding<'a> {
     pub(super) nominal: &'a Model,
     /// Whether one cable measures: its length shows of a motion what is along the cable alone.
     pub(super) by_one_cable: bool,
+    /// Numbers of the first row and the last.
+    pub(super) ends: [usize; 2],
     /// Unexplained growth of the arm over time (mm RMS).
     pub(super) growth_mm: f64,
     /// Unexplained dependence on the pose (mm RMS).
@@ -79,6 +81,7 @@ impl Confounding<'_> {
             return self
                 .by_empirical_fault(own)
                 .or_else(|| self.by_growth(causes, own))
+                .or_else(|| self.by_flank(causes))
                 .into_iter()
                 .collect();
         }
@@ -168,6 +171,26 @@ impl Confounding<'_> {
         let theirs = self.contributions.unique_rms_mm(&growth).hypot(self.growth_mm);
         (own < theirs).then(|| {
             format!("it explains {own:.4} mm, less than the growth of the arm, {theirs:.4} mm: links that warm up unequally look the same")
+        })
+    }
+
+    /// A joint's zero that moved and came back, which a drive that lost counts does not: a play does that changes its flank twice.
+    fn by_flank(&self, causes: &[usize]) -> Option<String> {
+        let returns = |&k: &usize| {
+            let cause = &self.causes[k];
+            let Some([from, to]) = cause.rows().filter(|_| cause.kind() == CauseKind::JointZeroShift) else {
+                return false;
+            };
+            let others = self.causes.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, other)| other);
+            let same = others.filter(|c| c.kind() == cause.kind() && c.joints() == cause.joints());
+            // Beside another one of the joint it may be a step from one level to a third.
+            let meets = same.filter_map(Cause::rows).any(|[start, end]| start <= to + 1 && from <= end + 1);
+            from > self.ends[0] && to < self.ends[1] && !meets
+        };
+        causes.iter().all(returns).then(|| {
+            "the zero came back, which it does not after lost counts: a play that gravity or friction holds on one flank and then on the other \
+             looks the same"
+                .to_owned()
         })
     }
 

@@ -477,6 +477,22 @@ fn a_joint_that_lost_counts_is_told_with_its_angle() {
     assert!((offset.value - 8e-4).abs() < 4.0 * offset.sigma.unwrap() + 1e-5, "{offset:?}");
 }
 
+/// Counts that are lost do not come back: a play that changes its flank twice looks like a zero that moved in some rows.
+#[test]
+fn a_zero_that_moves_and_comes_back_is_not_certain() {
+    let until = |until, rad| Hidden::LostCounts { joint: 2, until, rad };
+    let hidden = [until(219, 8e-4), until(149, -8e-4)];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 84)).dataset);
+    let moved = found.diagnosis.findings.iter().find(|f| f.effect == "joint-zero-shift").unwrap();
+    assert_eq!((moved.rows, moved.confidence), (Some([150, 219]), Confidence::Ambiguous));
+    assert!(moved.doubts.iter().any(|doubt| doubt.contains("came back")), "{:?}", moved.doubts);
+    // From one level to a second and on to a third it is lost twice.
+    let twice = [until(219, 8e-4), until(149, 6e-4)];
+    let found = diagnosed(&run(&arm(), &twice, &setup(Sensor::Position, 400, 84)).dataset);
+    let lost: Vec<_> = identified(&found).into_iter().filter(|f| f.effect == "joint-zero-shift").collect();
+    assert!(!lost.is_empty(), "{:?}", found.diagnosis.findings);
+}
+
 /// A reflector on a pole that yields under its weight: no spring of the wrist.
 #[test]
 fn a_target_that_droops_is_told_with_its_size() {
