@@ -43,6 +43,7 @@ pub mod halves;
 pub mod marginal;
 mod confirmation;
 pub mod contribution;
+mod play_flanks;
 mod confounding;
 mod merged;
 mod joint_scatter;

@@ -9,6 +9,8 @@ use super::cause::{Cause, Part};
 use super::cause_kind::CauseKind;
 use super::confirmation::Confirmation;
 use super::contribution::Contributions;
+use super::play_flanks;
+use crate::measurement::dataset::Dataset;
 use truegrind_arm::model::Model;
 use truegrind_math::distribution::chi_square_quantile;
 
@@ -24,8 +26,8 @@ pub(super) struct Confounding<'a> {
     pub(super) nominal: &'a Model,
     /// Whether one cable measures: its length shows of a motion what is along the cable alone.
     pub(super) by_one_cable: bool,
-    /// Numbers of the first row and the last.
-    pub(super) ends: [usize; 2],
+    /// The rows.
+    pub(super) dataset: &'a Dataset,
     /// Unexplained growth of the arm over time (mm RMS).
     pub(super) growth_mm: f64,
     /// Unexplained dependence on the pose (mm RMS).
@@ -174,24 +176,11 @@ impl Confounding<'_> {
         })
     }
 
-    /// A joint's zero that moved and came back, which a drive that lost counts does not: a play does that changes its flank twice.
+    /// A joint's zero that moved as a play moves it.
     fn by_flank(&self, causes: &[usize]) -> Option<String> {
-        let returns = |&k: &usize| {
-            let cause = &self.causes[k];
-            let Some([from, to]) = cause.rows().filter(|_| cause.kind() == CauseKind::JointZeroShift) else {
-                return false;
-            };
-            let others = self.causes.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, other)| other);
-            let same = others.filter(|c| c.kind() == cause.kind() && c.joints() == cause.joints());
-            // Beside another one of the joint it may be a step from one level to a third.
-            let meets = same.filter_map(Cause::rows).any(|[start, end]| start <= to + 1 && from <= end + 1);
-            from > self.ends[0] && to < self.ends[1] && !meets
-        };
-        causes.iter().all(returns).then(|| {
-            "the zero came back, which it does not after lost counts: a play that gravity or friction holds on one flank and then on the other \
-             looks the same"
-                .to_owned()
-        })
+        let doubt = |&k: &usize| play_flanks::doubt(self.causes, k, self.dataset, self.nominal);
+        let doubts: Option<Vec<&str>> = causes.iter().map(doubt).collect();
+        doubts?.first().map(|doubt| (*doubt).to_owned())
     }
 
     /// The largest contribution of an empirical fault (mm RMS).

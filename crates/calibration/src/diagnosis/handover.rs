@@ -8,13 +8,12 @@ use super::joint_scatter::JointScatter;
 use super::law_error;
 use super::link_geometry::LINK_Z;
 use super::options::Options;
+use super::play_flanks;
 use super::search::{Search, SearchContext};
 use super::selection::contains_cause;
 use super::sensor_causes::{self, Apart, apart};
 use super::validation::{ErrorsByStage, StageError};
-use super::written_model::{
-    certain_causes, fit_written, time_discrepancy, under_correlated_noise, written_causes,
-};
+use super::written_model::{fit_written, time_discrepancy, under_correlated_noise, written_causes};
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad};
 use crate::identification::calibration::Frames;
@@ -374,7 +373,15 @@ fn written(search: &Search<'_>, causes: &[Cause], discrepancy: Option<&Discrepan
 /// random folds and in blocks; causes that are not part of it do not count.
 fn certain_model(search: &Search<'_>, certain: &[bool], discrepancy: Option<&Discrepancy>) -> WrittenFit {
     let of = |certain: &[bool]| {
-        let fit = written(search, &certain_causes(&search.full_fit, certain), discrepancy);
+        let SearchContext { dataset, subject, .. } = search.context;
+        let causes = &search.full_fit.causes;
+        // All causes of the measurement, certain or not, but no zero that may be a play: the arm is not that of the rows on one flank.
+        let is_kept = |&k: &usize| {
+            let may_be_play = || play_flanks::doubt(causes, k, dataset, subject.nominal).is_some();
+            certain.get(k) != Some(&false) || !causes[k].is_in_arm() && !may_be_play()
+        };
+        let kept = written_causes((0..causes.len()).filter(is_kept).map(|k| &causes[k]));
+        let fit = written(search, &kept, discrepancy);
         WrittenFit { errors: search.validation.stage(&fit), fit }
     };
     let found = of(certain);

@@ -159,14 +159,13 @@ fn confounding<'s>(
 ) -> Confounding<'s> {
     let (context, outcome) = (search.context, &confirmed.outcome);
     let subject = &context.subject;
-    let rows = &subject.observed.dataset.rows;
     Confounding {
         causes: &search.searched_fit.causes,
         confirmations: &outcome.confirmations,
         contributions,
         nominal: subject.nominal,
         by_one_cable: context.dataset.sensor == Sensor::Cable && subject.frames.outlets_mm.len() == 1,
-        ends: [0, rows.len() - 1].map(|row| rows[row].number),
+        dataset: &subject.observed.dataset,
         growth_mm: outcome.discrepancy.growth_mm(),
         field_mm: outcome.discrepancy.field_mm(),
         excess_over_noise_mm: floor.map_or(0.0, |floor| {

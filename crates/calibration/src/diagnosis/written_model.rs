@@ -19,14 +19,6 @@ use crate::identification::tolerance::Tolerance;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Problem;
 
-/// The causes of a fit for the written model: all causes of the measurement, and those of the arm that are `certain`.
-pub(super) fn certain_causes(extended: &Extended, certain: &[bool]) -> Vec<Cause> {
-    let is_certain = |k: usize| certain.get(k) != Some(&false);
-    let causes = extended.causes.iter().enumerate();
-    let kept = causes.filter(|&(k, cause)| !cause.is_in_arm() || is_certain(k));
-    written_causes(kept.map(|(_, cause)| cause))
-}
-
 /// Causes as a written arm has them, each once.
 pub(super) fn written_causes<'c>(causes: impl Iterator<Item = &'c Cause>) -> Vec<Cause> {
     // Faults of the arm last, behind the effects.
