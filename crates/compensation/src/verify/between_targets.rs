@@ -197,6 +197,7 @@ impl<'a> Followed<'a> {
             before: end.joints,
             conf: None,
             external: None,
+            between_ends: false,
         }
     }
 
