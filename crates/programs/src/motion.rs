@@ -680,7 +680,12 @@ impl Listing {
         let tool = match self.tool(motion).map(|tool| &tool.value) {
             Some(Ok(tool)) => tool,
             Some(Err(Reason::Assigned)) => return Some(Reason::ToolAssigned),
-            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange | Reason::AfterProbing))) => {
+            Some(Err(
+                reason @ (Reason::BeyondReach
+                | Reason::NumberRange
+                | Reason::AfterProbing
+                | Reason::LengthAllowance),
+            )) => {
                 return Some(*reason);
             }
             Some(Err(Reason::Escaped)) => return Some(Reason::ToolEscaped),
