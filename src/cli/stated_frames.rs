@@ -42,9 +42,10 @@ pub(super) struct FramePriorArguments {
     /// corrected.
     #[arg(long, value_name = "MM[,DEG]", allow_hyphen_values = true)]
     frame_sigma: Option<String>,
-    /// Uncertainty of --touched-point (mm, standard deviation). Default: 50 mm, the same as for a point that is not stated.
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "touched_point")]
-    touched_sigma: Option<f64>,
+    /// Uncertainty of --touched-point: standard deviation in mm and, for the rotation of a target whose pose is measured, in degrees (default:
+    /// unknown). Default: 50 mm, the same as for a point that is not stated.
+    #[arg(long, value_name = "MM[,DEG]", allow_hyphen_values = true, requires = "touched_point")]
+    touched_sigma: Option<String>,
 }
 
 impl FramePriorArguments {
@@ -59,23 +60,32 @@ impl FramePriorArguments {
     ) -> anyhow::Result<(Tolerance, Frames)> {
         let Stated { frames: stated, touched } = stated;
         let mut tolerance = *tolerance;
-        if let Some(mm) = self.touched_sigma {
-            if !(mm > 0.0 && mm.is_finite()) {
-                bail!("--touched-sigma {mm}: expected a length above 0 in mm");
-            }
+        let touched_sigma = self.touched_sigma.as_deref().map(touched_sigma).transpose()?;
+        let touched_mm = touched_sigma.map(|(mm, _)| mm);
+        if let Some(mm) = touched_mm {
             tolerance.target_mm = mm;
         }
+        let turned = touched.zip(touched_sigma.and_then(|(_, rad)| rad));
+        if let Some((touched, rad)) = turned {
+            check_turn(&touched, rad, (of_arm, &found), dataset)?;
+            tolerance.target_rad = rad;
+        }
+        let in_stated_turn = |mut frames: Frames| {
+            if let Some((touched, _)) = turned {
+                frames.flange_from_target.rotation = touched.rotation;
+            }
+            frames
+        };
         let found = match stated {
             Some(stated) => beside(dataset, nominal, stated, touched.as_ref(), &found),
             None => found,
         };
         if let Some(touched) = &touched
-            && (stated.is_none() || self.touched_sigma.is_some())
-            && contradicted_target(dataset, nominal, touched, self.touched_sigma.unwrap_or(0.0), &found)
-                .is_some()
+            && (stated.is_none() || touched_mm.is_some())
+            && contradicted_target(dataset, nominal, touched, touched_mm.unwrap_or(0.0), &found).is_some()
         {
             // The arm of the data sheet alone refuses nothing.
-            let sigma_mm = self.touched_sigma.unwrap_or(UNSTATED_MM);
+            let sigma_mm = touched_mm.unwrap_or(UNSTATED_MM);
             let judged = target_contradiction_by_fit(of_arm, touched, sigma_mm, &found, (dataset, nominal));
             if let Some(contradiction) = judged {
                 bail!("{contradiction}");
@@ -93,18 +103,18 @@ impl FramePriorArguments {
                     bail!("{contradiction}");
                 }
             }
-            let begins_there = stated.is_none() || self.touched_sigma.is_some();
+            let begins_there = stated.is_none() || touched_mm.is_some();
             let frames = match touched.filter(|_| begins_there) {
                 Some(touched) => with_touched_point(dataset, nominal, &touched, found),
                 None => found,
             };
-            return Ok((tolerance, frames));
+            return Ok((tolerance, in_stated_turn(frames)));
         };
         let Some(stated) = stated else {
             bail!("--frame-sigma needs --sensor-frame, or --outlet and --cable-zero");
         };
         let sigma @ [mm, rad] = frame_sigma(text)?;
-        let frames = Frames { flange_from_target: target(touched, &found), ..stated.clone() };
+        let frames = in_stated_turn(Frames { flange_from_target: target(touched, &found), ..stated.clone() });
         let (judged, geometry) =
             judged_by_fit([&tolerance, of_arm], (&frames, &found), sigma, (dataset, nominal));
         // The arm of the data sheet alone refuses nothing, but may say what is wrong with the frame.
@@ -138,6 +148,55 @@ fn frame_sigma(text: &str) -> anyhow::Result<[f64; 2]> {
         bail!("--frame-sigma {text}: expected numbers above 0");
     }
     Ok([mm, deg.to_radians()])
+}
+
+/// Standard deviations of a stated target (mm, rad); no angle where none is stated.
+fn touched_sigma(text: &str) -> anyhow::Result<(f64, Option<f64>)> {
+    let (mm, deg) = match numbers("--touched-sigma", text)?[..] {
+        [mm] => (mm, None),
+        [mm, deg] => (mm, Some(deg)),
+        _ => bail!("--touched-sigma {text}: expected MM or MM,DEG"),
+    };
+    if !(mm > 0.0) {
+        bail!("--touched-sigma {text}: expected a length above 0 in mm");
+    }
+    if deg.is_some_and(|deg| !(deg > 0.0)) {
+        bail!("--touched-sigma {text}: expected an angle above 0 in degrees");
+    }
+    Ok((mm, deg.map(f64::to_radians)))
+}
+
+/// Standard deviations by which the readings may turn a target otherwise than it is stated.
+const TURN_SIGMAS: f64 = 5.0;
+
+/// Refuses the rotation of a target that no measurement shows, or that the readings contradict by more than an arm of these tolerances can be
+/// off: that of its six zeros adds up at the flange.
+fn check_turn(
+    touched: &Pose,
+    sigma_rad: f64,
+    (of_arm, found): (&Tolerance, &Frames),
+    dataset: &Dataset,
+) -> anyhow::Result<()> {
+    if dataset.sensor != Sensor::Pose {
+        bail!(
+            "--touched-sigma: {} shows no orientation of the target: expected MM alone, without DEG",
+            dataset.file
+        );
+    }
+    let off_rad = touched.rotation.angle_to(&found.flange_from_target.rotation);
+    if off_rad > TURN_SIGMAS * sigma_rad.hypot(6.0_f64.sqrt() * of_arm.zero_rad) {
+        let q = found.flange_from_target.rotation.quaternion();
+        bail!(
+            "--touched-point: the readings turn the target {:.1}° from there, to {:.4},{:.4},{:.4},{:.4} (w, x, y, z) on the flange: check its rotation, or \
+             state none (--touched-sigma MM)",
+            off_rad.to_degrees(),
+            q.w,
+            q.i,
+            q.j,
+            q.k
+        );
+    }
+    Ok(())
 }
 
 /// Uncertainty of a frame or point whose own is not stated, to judge it (mm).

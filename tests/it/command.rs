@@ -393,6 +393,8 @@ fn stated_frames_that_make_no_sense_are_refused() {
         (vec!["--outlet", "1,2,3", "--outlet", "1,2,3", "--cable-zero", "3"], "given 2 times"),
         (vec!["--touched-point", "1,2"], "2 numbers"),
         (vec!["--touched-point", "1,2,3", "--touched-sigma", "0"], "expected a length above 0"),
+        (vec!["--touched-point", "1,2,3", "--touched-sigma", "1,0"], "expected an angle above 0"),
+        (vec!["--touched-point", "1,2,3", "--touched-sigma", "1,2"], "no orientation of the target"),
         (vec!["--outlet", "1,2,3", "--cable-zero", "3", "--touched-point", "0,0,0,1,1,0,0"], "length 1.414"),
     ] {
         let all = [&["identify", "data.csv", "--robot", "abb-irb-120"], stated.as_slice()].concat();

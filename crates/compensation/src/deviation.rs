@@ -376,8 +376,16 @@ impl PathReport {
     /// was not measured in the work object. Points that are not corrected count too: the part has them all. `None` for fewer than three
     /// points.
     pub fn registered_rms_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
+        Self::registered_rms_mm_of(self.cut(), which)
+    }
+
+    /// The same of some points.
+    pub fn registered_rms_mm_of<'p>(
+        points: impl Iterator<Item = &'p PathPoint>,
+        which: fn(&PathPoint) -> Option<Deviation>,
+    ) -> Option<f64> {
         let mut parts: BTreeMap<u32, Vec<Pair>> = BTreeMap::new();
-        for point in self.cut() {
+        for point in points {
             let Some(deviation) = which(point) else { continue };
             let in_object =
                 point.base_from_object.inverse() * Point3::from(point.intended.translation.vector);

@@ -19,6 +19,8 @@ use std::sync::Arc;
 pub use axis_turn::AxisTurn;
 pub use reason::{OpaqueReason, Reason};
 use smallvec::SmallVec;
+
+use crate::nc::orientation::WordsAtPole;
 pub use target::{Frame, JointTarget, MAX_POSITION_MM, RobTarget, TargetValue};
 
 /// A range of bytes of one file, end excluded.
@@ -542,6 +544,8 @@ pub struct NcFacts {
     pub external_calls: Vec<u32>,
     /// Motions behind a label, a jump, a call or a loop that are left because words are missing there, with these words.
     pub unstated: BTreeMap<u32, String>,
+    /// Words of orientation at the ends of motions where they are near a pole of their convention.
+    pub at_poles: BTreeMap<u32, WordsAtPole>,
 }
 
 /// An offset of a target by persistent data, which stay on the controller when the program ends: an operator or another task may change
@@ -676,7 +680,12 @@ impl Listing {
         let tool = match self.tool(motion).map(|tool| &tool.value) {
             Some(Ok(tool)) => tool,
             Some(Err(Reason::Assigned)) => return Some(Reason::ToolAssigned),
-            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange | Reason::AfterProbing))) => {
+            Some(Err(
+                reason @ (Reason::BeyondReach
+                | Reason::NumberRange
+                | Reason::AfterProbing
+                | Reason::LengthAllowance),
+            )) => {
                 return Some(*reason);
             }
             Some(Err(Reason::Escaped)) => return Some(Reason::ToolEscaped),

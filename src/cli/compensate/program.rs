@@ -91,7 +91,8 @@ pub(super) fn rewrite_program(
     let ended = if result.changed { Ended::Changed } else { Ended::Unchanged };
     result.row = Row::of(names.join(", "), output, ended, &plan, listing);
     let undeclared =
-        [Reason::Undeclared, Reason::ToolUnknown, Reason::WorkObjectUnknown].map(OutcomeReason::Program);
+        [Reason::Undeclared, Reason::ToolUnknown, Reason::LengthAllowance, Reason::WorkObjectUnknown]
+            .map(OutcomeReason::Program);
     result.undeclared = plan
         .outcomes
         .iter()

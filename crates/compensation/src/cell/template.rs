@@ -92,7 +92,10 @@ fn note(program: &TemplateProgram<'_>, motion: &Motion, found: &mut BTreeMap<Key
         (true, tool.name.as_str(), commanded)
     });
     let object = listing.work_object(motion).map(|object| {
-        let commanded = object.value.as_ref().map(|value| value.user_frame.pose()).map_err(|reason| *reason);
+        let commanded = match &object.value {
+            Ok(value) if !value.fixed => Err(Reason::MovingWorkObject),
+            value => value.as_ref().map(|value| value.user_frame.pose()).map_err(|reason| *reason),
+        };
         (false, object.name.as_str(), commanded)
     });
     for (is_tool, name, commanded) in tool.into_iter().chain(object) {
@@ -214,6 +217,10 @@ impl Writer {
         if let (Language::Rapid, Err(reason)) = (named.language, named.commanded) {
             let remedy = match reason {
                 Reason::Undeclared => "give the module that declares it, too",
+                Reason::MovingWorkObject => {
+                    "motions in it are not corrected, whatever its origin; those past which the axis does not move can be, in a work object that is fixed \
+                     where the part then is (ufprog TRUE)"
+                }
                 _ => "a cell file cannot say it",
             };
             self.line(&format!("# {what} {}: {reason}: {remedy} ({uses})", named.name), "");

@@ -60,7 +60,15 @@ fn names<'a>(listing: &'a Listing, motion: &Motion) -> impl Iterator<Item = (boo
 /// computes it from what is known only at run time.
 fn nowhere(reason: Option<&Reason>, declared: Option<Place>) -> bool {
     declared.is_none()
-        && matches!(reason, Some(Reason::Undeclared | Reason::ToolUnknown | Reason::WorkObjectUnknown))
+        && matches!(
+            reason,
+            Some(
+                Reason::Undeclared
+                    | Reason::ToolUnknown
+                    | Reason::LengthAllowance
+                    | Reason::WorkObjectUnknown
+            )
+        )
 }
 
 /// One sentence for each, with the remedy.

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use crate::arms::Arms;
 use crate::condition::payload::{is_load_dependent, payload_at};
+use crate::frames::frame_table::FrameTable;
 use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
 use crate::plan::MotionOutcome;
@@ -153,6 +154,39 @@ pub(crate) fn several_starts_note(listing: &Listing, motions: &[u32]) -> Option<
         "{} at more than one place: the path from each was checked against --tolerance, but not for joint limits, singularities or speed, and no \
          targets were inserted ({lines})",
         counted(motions.len(), "line or arc may start", "lines or arcs may start")
+    ))
+}
+
+/// A smaller tilt is not worth a note (rad).
+const TILT_RAD: f64 = 1e-4;
+
+/// Targets near a pole of A, B and C, in an orientation that is not quite the intended one.
+pub(crate) fn at_poles_note(
+    listing: &Listing,
+    solved: &SolvedTargets<'_>,
+    outcomes: &[MotionOutcome],
+    frame_table: &FrameTable,
+    arms: &Arms<'_>,
+) -> Option<String> {
+    let mut largest_rad = 0.0_f64;
+    let mut tilted: Vec<u32> = Vec::new();
+    let written = |motion: &&u32| outcomes[**motion as usize].status.is_written();
+    for motion in listing.nc.at_poles.keys().filter(written) {
+        let Some(Ok(target)) = solved.of(*motion as usize).last() else { continue };
+        let flange = arms.conditions.arm(target.condition_index).forward(&target.after);
+        let reached = frame_table.list[target.frames_index].real.target_of(&flange);
+        let tilt_rad = reached.rotation.angle_to(&target.intended.pose().rotation);
+        if tilt_rad > TILT_RAD {
+            largest_rad = largest_rad.max(tilt_rad);
+            tilted.push(*motion);
+        }
+    }
+    let lines = lines_of(listing, &tilted)?;
+    Some(format!(
+        "{} near a pole of A, B and C (B beyond 80° from 0), where they would have to run far for a small turn of the tool: the position is \
+         corrected, and the tool stays tilted by up to {:.3}° ({lines})",
+        counted(tilted.len(), "target lies", "targets lie"),
+        largest_rad.to_degrees()
     ))
 }
 

@@ -23,7 +23,7 @@ use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
 use crate::plan::notes::{
-    backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, several_starts_note,
+    at_poles_note, backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, several_starts_note,
     unchecked_notes, unknown_loads,
 };
 use crate::plan::reason::OutcomeReason;
@@ -73,6 +73,7 @@ pub(super) fn planned(job: &Planner<'_>) -> Plan {
     notes.extend(unchecked_notes(listing, solved, &unchecked));
     let from_several: Vec<u32> = chunks.iter().flat_map(|chunk| &chunk.from_several).copied().collect();
     notes.extend(several_starts_note(listing, &from_several));
+    notes.extend(at_poles_note(listing, solved, &outcomes, frame_table, arms));
     notes.extend(beyond_noise_note(arms, outcomes.iter().filter_map(|outcome| outcome.shape_sigma_mm.get())));
     #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
     let changes = changes.into_iter().filter_map(|change| change).collect();
@@ -135,6 +136,7 @@ fn segment_end<'a>(
         before: to.before,
         conf: cartesian.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
         external: stated.map(TargetValue::external),
+        between_ends: false,
     })
 }
 
@@ -306,7 +308,9 @@ impl<'a> Planner<'a> {
             return None;
         }
         let from = segment_end(before, targets, self.frame_table)?;
-        let to = segment_end(motion, self.solved.of(index), self.frame_table)?;
+        let mut to = segment_end(motion, self.solved.of(index), self.frame_table)?;
+        let at_poles = &self.listing.nc.at_poles;
+        to.between_ends = [previous, index].iter().any(|end| at_poles.contains_key(&(*end as u32)));
         let schedule = self.solved.condition_schedule(index, to.condition_index);
         let from = if from.index == to.index { from } else { from.with_frames_of(&to) };
         Some(Segment { from, to, schedule })

@@ -58,10 +58,13 @@ impl Corner {
         let curve = a - 2.0 * b + c;
         let along = |t: f64| 2.0 * ((b - a) + curve * t);
         let at = |t: f64| a + 2.0 * (b - a) * t + curve * (t * t);
-        // The nearest share by Gauss-Newton steps: the point is close, so they never go the wrong way.
+        // The nearest share by Gauss-Newton steps: the point is close, so they hardly ever go the wrong way. Where the path turns back a point a
+        // little beyond its tip has no share at which they end: no point of the corner is farther than the nearest.
         let mut t = t;
+        let mut least = f64::INFINITY;
         for _ in 0..12 {
             let (off, first) = (at(t) - point, along(t));
+            least = least.min(off.norm());
             let square = first.norm_squared();
             if square < 1e-12 {
                 break;
@@ -75,7 +78,8 @@ impl Corner {
         }
         let off: Vector3<f64> = point - at(t);
         // Before and after the corner the path continues along its tangents.
-        if t <= 0.0 || t >= 1.0 { lateral_offset(&off, &along(t)) } else { off.norm() }
+        let last = if t <= 0.0 || t >= 1.0 { lateral_offset(&off, &along(t)) } else { off.norm() };
+        last.min(least)
     }
 }
 

@@ -12,6 +12,7 @@ use crate::options::{Emit, Options};
 use crate::segment::condition_schedule::{CHORD_MM, ConditionSchedule};
 use crate::segment::curve::{between, lateral_offset};
 use crate::segment::rounded_end::RoundedEnd;
+use crate::target::at_pole::joints_in_orientation;
 use truegrind_arm::model::Joints;
 use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::{Pose, angle_bound_rad};
@@ -37,6 +38,8 @@ pub(crate) struct SegmentEnd<'a> {
     pub(crate) conf: Option<[i32; 4]>,
     /// External axes of the target, where known.
     pub(crate) external: Option<&'a [OptionF64; 6]>,
+    /// Whether the orientation of targets inserted before it must lie between those of the ends: near a pole of its words.
+    pub(crate) between_ends: bool,
 }
 
 impl<'a> SegmentEnd<'a> {
@@ -505,6 +508,12 @@ fn end_between<'a>(
         .solve_near(&to.frames.real.flange_for(&intended), &near)
         .ok()?
         .joints;
+    let joints = if to.between_ends {
+        let turned = between(&from.commanded, &to.commanded, s).rotation;
+        joints_in_orientation(turned, &intended, &joints, to.frames, condition_index, arms).ok()?
+    } else {
+        joints
+    };
     let commanded = to.frames.commanded.target_of(&arms.nominal.arm().forward(&joints));
     Some(SegmentEnd { intended, commanded, joints, condition_index, before: near, ..*to })
 }

@@ -26,10 +26,12 @@ use crate::plan::reason::OutcomeReason;
 use crate::risk::assessment::Assessment;
 use crate::search_budget;
 use crate::segment::condition_schedule::ConditionSchedule;
+use crate::target::at_pole::joints_in_orientation;
 use crate::target::original_joints::{BranchGuess, OriginalProgram, OriginalTarget, TargetRef};
 use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
 use crate::target::target_ranges::TargetRanges;
 use truegrind_arm::estimated::{CarriedFrame, FlangePoint, RegisteredFrame};
+use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::model::Joints;
@@ -333,7 +335,16 @@ fn solve_chunk<'t>(
         Err(original.as_ref().err().copied().unwrap_or(UNSOLVED))
     };
     out.iter_mut().zip(originals).for_each(|(out, original)| *out = waiting(original));
-    let reachable = reachable_targets(originals, condition_indices, arms, frame_table, out);
+    let mut reachable = reachable_targets(originals, condition_indices, arms, frame_table, out);
+    if !work.listing.nc.at_poles.is_empty() {
+        reachable.retain_mut(|target| match target.keep_words_near(target_refs, arms, work) {
+            Ok(()) => true,
+            Err(error) => {
+                out[target.index] = Err(OutcomeReason::of_inverse(error));
+                false
+            }
+        });
+    }
     let joint_form = |w: &ReachableTarget<'_, '_>| {
         as_joints(target_refs[w.index].motion, target_refs[w.index].target, options.emit)
     };
@@ -548,6 +559,27 @@ struct ReachableTarget<'o, 't> {
     after: Joints,
     singularity: f64,
     reached_before: Pose,
+}
+
+impl ReachableTarget<'_, '_> {
+    /// Near a pole of the words of orientation: the orientation, of those with words near the programmed ones, nearest to the intended one.
+    fn keep_words_near(
+        &mut self,
+        target_refs: &[TargetRef<'_>],
+        arms: &Arms<'_>,
+        work: &TargetSolver<'_, '_>,
+    ) -> Result<(), InverseError> {
+        let TargetRef { index, target, .. } = &target_refs[self.index];
+        let Some(words) = work.listing.nc.at_poles.get(index).filter(|_| target.role == Role::To) else {
+            return Ok(());
+        };
+        let frames = &work.frame_table.list[self.original.frames_index];
+        let exact = frames.commanded.target_of(&arms.nominal.arm().forward(&self.after)).rotation;
+        let turned = words.nearest(&exact);
+        self.after =
+            joints_in_orientation(turned, &self.intended, &self.after, frames, self.condition_index, arms)?;
+        Ok(())
+    }
 }
 
 /// A pose as it will be read back: positions in units of 1 / `scale` mm, quaternions with seven decimals.

@@ -5,7 +5,8 @@
 //! ([`line_deviation`], [`Circle`]). The intended line or arc is carried to where its two ends are really reached: how far these are off is
 //! told of the targets, and a model other than the correcting one, or a placement that is kept, displaces all of the path alike.
 //! A line or arc that starts at a target which is not corrected is judged where its own end hardly moves; elsewhere it is listed, as the path
-//! steps there. Where the text does not tell the start, it is listed and judged from the motions that may come before all the same.
+//! steps there. Where the text does not tell the start, it is listed and judged from the motions that may come before all the same. The corner
+//! between two of them that the robot rounds is compared with the one that the intended ones make.
 
 use std::collections::BTreeSet;
 
@@ -14,11 +15,12 @@ use nalgebra::Vector3;
 use super::differences::{nearest_share, way};
 use super::executed_end::{ExecutedEnd, Run};
 use crate::arms::Arms;
-use crate::cut::StartsOf;
+use crate::cut::{StartsOf, only_start};
 use crate::deviation::BetweenTargets;
 use crate::line_list::lines_of;
 use crate::options::Emit;
 use crate::segment::circle::Circle;
+use crate::segment::corner::{CornerSegments, corner_deviation};
 use crate::segment::curve::Curve;
 use crate::segment::line::{Segment, SegmentEnd, line_deviation, midpoint_deviations};
 use crate::segment::segment_plan::by_axes_mm;
@@ -87,6 +89,14 @@ impl<'a> Followed<'a> {
             let largest = &mut found.largest_mm[piece.index];
             *largest = Some(largest.map_or(mm, |before| before.max(mm)));
         }
+        for index in 0..count {
+            checkpoint();
+            if let Some((mm, free)) = self.corner_mm(index, arms) {
+                let largest = &mut found.largest_mm[index];
+                *largest = Some(largest.map_or(mm, |before| before.max(mm)));
+                free_mm[index] = free_mm[index].max(free);
+            }
+        }
         let bound_mm = |index: usize| tolerance_mm + WRITTEN_MM + free_mm[index];
         let beyond: Vec<u32> = (0..count)
             .filter(|index| found.largest_mm[*index].is_some_and(|mm| !(mm <= bound_mm(*index))))
@@ -151,6 +161,53 @@ impl<'a> Followed<'a> {
         }
     }
 
+    /// Deviation from the intended corner where the path to the end of an original motion begins (mm), and what its ends allow beside the
+    /// tolerance; `None` where the robot rounds no corner there, or where the correction does not move what lies beside it.
+    fn corner_mm(&self, index: usize, arms: &Arms<'_>) -> Option<(f64, f64)> {
+        let at = only_start(self.original, index)?;
+        let (_, corner) = self.changed(at)?;
+        let zone = self.rewritten.zone(&self.rewritten.motions[corner])?.value.as_ref().ok()?;
+        if zone.fine {
+            return None;
+        }
+        let begin = only_start(self.original, at)?;
+        let [into, out] = [[begin, at], [at, index]].map(|[from, to]| self.known_path(from, to));
+        let (into, out) = (into?, out?);
+        // Between joint targets the corner is one of joints; the manuals do not specify one between two tools or work objects.
+        let is_of_poses = |node: &ExecutedEnd| {
+            !matches!(self.rewritten.motions[node.motion].kind, MotionKind::AbsoluteJoint)
+        };
+        let nodes = into.nodes.iter().chain(&out.nodes).skip(1);
+        if into.to.index != out.start.index
+            || into.to.index != out.to.index
+            || !nodes.clone().all(|node| is_of_poses(node))
+        {
+            return None;
+        }
+        let commanded = |path: &IntendedPath<'_>, [from, to]: [usize; 2]| {
+            let from = if from == 0 { path.start.commanded } else { path.nodes[from].commanded };
+            way(&self.rewritten.motions[path.nodes[to].motion], from, path.nodes[to].commanded)
+        };
+        let last = into.nodes.len() - 1;
+        let [first, second] = [commanded(&into, [last - 1, last])?, commanded(&out, [0, 1])?];
+        let segments =
+            CornerSegments { intended: [&into.carried, &out.carried], commanded: [&first, &second] };
+        let conditions = [into.to.condition_index, self.run.schedule(out.nodes[1]).at(0.0)];
+        let mm = corner_deviation(&out.start, &segments, zone.tcp_mm, conditions, arms)?;
+        Some((mm, into.free_mm.max(out.free_mm)))
+    }
+
+    /// The path from one original motion to the next, where the correction moves both.
+    fn known_path(&self, from: usize, to: usize) -> Option<IntendedPath<'a>> {
+        let was = &self.original.motions[to];
+        if !matches!(was.kind, MotionKind::Linear | MotionKind::Circular) {
+            return None;
+        }
+        let ((from, first), (end, partner)) = (self.changed(from)?, self.changed(to)?);
+        let nodes = self.nodes(first, partner, was.previous.is_some())?;
+        self.intended_way(was, from, end, &nodes)
+    }
+
     /// The end of an original motion and its rewritten motion.
     fn end(&self, index: usize) -> Option<(&'a ExecutedEnd, usize)> {
         Some((self.before[index]?, self.partners[index]?))
@@ -197,6 +254,7 @@ impl<'a> Followed<'a> {
             before: end.joints,
             conf: None,
             external: None,
+            between_ends: false,
         }
     }
 

@@ -22,7 +22,7 @@ use truegrind_programs::motion::Listing;
 use truegrind_programs::rapid::Task;
 use truegrind_programs::rewrite::{NewTarget, RewriteOptions};
 
-use super::{estimated, nominal, perturbed};
+use super::{estimated, nominal, perturbed, run_on};
 
 pub(super) const EXT: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
 
@@ -120,6 +120,12 @@ fn a_right_angle_is_rounded_by_a_parabola() {
     // Cut to half of the shorter way.
     let cut = Corner::of(&way_in, &way_out, 40.0);
     assert!((cut.at(0.0).translation.vector.x + 15.0).abs() < 1e-12);
+    // Where the path turns back, a point 0.05 mm beyond the tip was said to be 1.3 mm off.
+    let back = Corner::of(&way_in, &Curve::line(way_in.to, way_in.from), 10.0);
+    for t in [0.3, 0.45, 0.5, 0.7] {
+        let off = back.distance(&at(-4.95, 1e-3), t);
+        assert!(off < 0.06, "{t}: {off}");
+    }
     // Beside the corner, before it and behind it.
     let off = |x: f64, y: f64, t: f64| corner.distance(&at(x, y), t);
     let half = 2.5 + 0.1 * std::f64::consts::FRAC_1_SQRT_2;
@@ -170,6 +176,45 @@ fn a_rounded_corner_is_checked_along_its_parabola() {
         most > 1e-3 && stated >= line && (most.max(line) - stated).abs() < 5e-3,
         "{most} {line} {stated}"
     );
+}
+
+/// Between targets lines and arcs alone were judged.
+#[test]
+fn verification_judges_rounded_corners_as_the_correction_does() {
+    let actual = perturbed(21, 3.0);
+    let source = square_program("z50");
+    let (planned, text) =
+        rewrite(&source, &known(&actual), &Options { tolerance_mm: 1.0, ..Options::default() });
+    let largest_mm = |text: &str| {
+        let report = run_on(&actual, source.as_bytes(), text.as_bytes(), &Cell::default());
+        report.between.unwrap().largest_mm.unwrap()
+    };
+    let stated = planned.outcomes.iter().filter_map(|outcome| outcome.path_deviation_mm.get());
+    let (stated, found) = (stated.fold(0.0, f64::max), largest_mm(&text));
+    assert!((stated - found).abs() < 0.01, "{stated} {found}");
+    // A target on the line to a corner, 40 mm before it: its zone of 50 mm ends half-way there.
+    let listing = Task::read(&[("p.mod", text.as_bytes())]).listing;
+    let ends = told(&listing);
+    let length_mm = (ends[1].translation.vector - ends[0].translation.vector).norm();
+    let pose = ends[1].lerp_slerp(&ends[0], 40.0 / length_mm);
+    let motion = &listing.motions[1];
+    let (start, end) = (motion.statement.start as usize, motion.statement.end as usize);
+    let (at, q) = (pose.translation.vector, pose.rotation.quaternion());
+    let inserted = format!(
+        "MoveL [[{:.4},{:.4},{:.4}],[{:.8},{:.8},{:.8},{:.8}],[{}",
+        at.x,
+        at.y,
+        at.z,
+        q.w,
+        q.i,
+        q.j,
+        q.k,
+        text[start..end].splitn(4, '[').nth(3).unwrap().split_once("],[").unwrap().1.replace("z50", "z1")
+    );
+    let sharper = format!("{}{inserted}\n{}", &text[..start], &text[start..]);
+    // The corner cuts off √2/4 of its radius: 50 mm before, 20 mm now.
+    let found = largest_mm(&sharper);
+    assert!((found - 30.0 * 2.0_f64.sqrt() / 4.0).abs() < 0.5, "{found}\n{sharper}");
 }
 
 /// Targets were inserted half-way to a rounded corner: they cut its zone short, and bent the path by more than they straightened the line.

@@ -5,7 +5,7 @@
 //! rotation about the vector is the *spin*, the angle from the frame whose x axis lies in the plane of z and the work
 //! object's x (or y, where z is along x); see [`spun`].
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Const, Matrix3, SVD, UnitQuaternion, Vector3};
 
 use truegrind_math::se3::rotation_from_matrix;
 
@@ -119,6 +119,87 @@ impl Angles {
         if self == Angles::Wpr { [best[2], best[1], best[0]] } else { best }
     }
 }
+
+/// Three words of orientation near a pole of their convention. At B = ±90 A and C turn the tool about one axis: for a small turn about another
+/// there are no words near them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WordsAtPole {
+    convention: Angles,
+    words_deg: [f64; 3],
+}
+
+/// How far the words turn the tool per turn of their own, in the direction in which they do so least: below this they are near a pole, which is
+/// B beyond ±80.
+///
+/// A control may run the words linearly from one block to the next. Let the tool turn by s for a unit of the word there, and by 1 at the other end
+/// of a line: words that run ahead by 1/s tilt it on the way by up to (1 + s)²/4s − 1 of the turn that they express at the ends. For
+/// s = cos 80° = 0.17 that is all of it, so that beyond nothing is gained.
+const POLE: f64 = 0.12;
+
+impl WordsAtPole {
+    /// `None` where the words are not near a pole.
+    pub fn of(convention: Angles, words_deg: [f64; 3]) -> Option<Self> {
+        let may_be = match convention {
+            Angles::RotationVector => Vector3::from(words_deg).norm() > 300.0,
+            _ => words_deg[1].to_radians().cos().abs() < 2.0 * POLE,
+        };
+        let words = Self { convention, words_deg };
+        (may_be && words.turns().singular_values[2] < POLE).then_some(words)
+    }
+
+    /// Of the orientations with words near these the nearest to `rotation`.
+    ///
+    /// ```
+    /// use nalgebra::{UnitQuaternion, Vector3};
+    /// use truegrind_programs::nc::orientation::{Angles, WordsAtPole};
+    ///
+    /// let words = [0.0, 89.9, 0.0];
+    /// let at_pole = WordsAtPole::of(Angles::Wpr, words).ok_or("not near")?;
+    /// // A turn of 0.2° about each axis: that about x would take A and C 64° away.
+    /// let turn = UnitQuaternion::from_scaled_axis(Vector3::repeat(0.2_f64.to_radians()));
+    /// let wanted = turn * Angles::Wpr.rotation(words);
+    /// assert!(Angles::Wpr.angles(&wanted, words)[0].abs() > 60.0);
+    /// let found = at_pole.nearest(&wanted);
+    /// let near = Angles::Wpr.angles(&found, words);
+    /// assert!(near.iter().zip(words).all(|(near, word)| (near - word).abs() < 0.3), "{near:?}");
+    /// assert!(found.angle_to(&wanted).to_degrees() < 0.2001);
+    /// assert!(WordsAtPole::of(Angles::Wpr, [0.0, 75.0, 0.0]).is_none());
+    /// # Ok::<(), &str>(())
+    /// ```
+    pub fn nearest(&self, rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+        let turns = self.turns();
+        let (Some(turned), Some(words)) = (turns.u, turns.v_t) else { return *rotation };
+        let mut at = Vector3::from(self.words_deg);
+        for _ in 0..STEPS {
+            let left = (rotation * self.convention.rotation(at.into()).inverse()).scaled_axis();
+            for k in 0..2 {
+                let by = turned.column(k).dot(&left) / turns.singular_values[k];
+                at += words.row(k).transpose() * by.to_degrees();
+            }
+        }
+        self.convention.rotation(at.into())
+    }
+
+    /// The turn of the tool per turn of the words.
+    fn turns(&self) -> SVD<f64, Const<3>, Const<3>> {
+        let at = |axis: usize, by_deg: f64| {
+            let mut words = self.words_deg;
+            words[axis] += by_deg;
+            self.convention.rotation(words)
+        };
+        let columns: [Vector3<f64>; 3] = std::array::from_fn(|axis| {
+            let turn = at(axis, STEP_DEG) * at(axis, -STEP_DEG).inverse();
+            turn.scaled_axis() / (2.0 * STEP_DEG.to_radians())
+        });
+        Matrix3::from_columns(&columns).svd(true, true)
+    }
+}
+
+/// Newton steps of [`WordsAtPole::nearest`]; each leaves a share of the error as large as the turn (rad).
+const STEPS: usize = 8;
+
+/// Step of the differences of words (°).
+const STEP_DEG: f64 = 1e-3;
 
 /// The rotation vector (°) nearest to an old one, in its direction or the opposite one.
 fn rotation_vector(rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {

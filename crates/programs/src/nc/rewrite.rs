@@ -614,6 +614,7 @@ fn keeps_endpoint(reason: Reason) -> bool {
         Reason::RadiusCompensation
             | Reason::NoTcpMode
             | Reason::ToolUnknown
+            | Reason::LengthAllowance
             | Reason::WorkObjectUnknown
             | Reason::CentreElsewhere
             | Reason::BeforeUnmodifiedArc

@@ -406,6 +406,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.listing.motions.truncate(motions);
         self.listing.nc.external_calls.retain(|call| (*call as usize) < motions);
         self.listing.nc.unstated.retain(|motion, _| (*motion as usize) < motions);
+        self.listing.nc.at_poles.split_off(&(motions as u32));
         self.listing.predecessors.split_off(&(motions as u32));
         self.listing.speeds.truncate(speeds);
         self.listing.zones.truncate(zones);

@@ -241,12 +241,10 @@ fn left_paths(plan: &Plan, listing: &Listing) -> Option<String> {
     }
 }
 
-/// Canned cycles that make something; those that set a plane or are defined for later make nothing.
+/// Canned cycles that make something; those that are defined for later make nothing.
 fn left_cycles(listing: &Listing) -> usize {
-    let makes = |motion: &&Motion| {
-        motion.own_reason == Some(Reason::Cycle)
-            && !["PLANE", "CYCLE800", "CYCL DEF"].contains(&&*motion.instruction)
-    };
+    let makes =
+        |motion: &&Motion| motion.own_reason == Some(Reason::Cycle) && &*motion.instruction != "CYCL DEF";
     listing.motions.iter().filter(makes).count()
 }
 

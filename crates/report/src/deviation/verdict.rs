@@ -1,6 +1,6 @@
 //! Verdict on a corrected path.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
@@ -148,18 +148,16 @@ fn remainder(report: &PathReport) -> Option<Remainder> {
         let (mm, sigma) = (point.after?.norm_mm(), point.sigma_mm?);
         (point.is_corrected() && mm > CERTAIN_MM.max(CERTAIN_SIGMAS * sigma)).then_some((mm, sigma))
     };
-    let parts: BTreeSet<u32> = report.cut().filter(|p| known(p).is_some()).map(|p| p.part).collect();
-    let is_known_place = |part: &u32| {
-        let points = report.cut().filter(|point| point.part == *part).cloned().collect();
-        let alone = PathReport { points, ..report.clone() };
-        alone.registered_rms_mm(AFTER).is_some() && only_shape(&alone).is_none()
-    };
-    let parts: BTreeSet<u32> = parts.into_iter().filter(is_known_place).collect();
-    let left: Vec<&PathPoint> =
-        report.cut().filter(|point| parts.contains(&point.part) && known(point).is_some()).collect();
-    let (largest_mm, sigma_mm) =
-        left.iter().filter_map(|point| known(point)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let places = left.iter().map(|point| Place { file: point.file, line: point.line, column: 0 });
+    let mut parts: BTreeMap<u32, Vec<&PathPoint>> = BTreeMap::new();
+    report.cut().for_each(|point| parts.entry(point.part).or_default().push(point));
+    parts.retain(|_, points| {
+        points.iter().any(|point| known(point).is_some())
+            && registered_rms_mm(points, AFTER).is_some()
+            && only_shape_of(points).is_none()
+    });
+    let left = || report.cut().filter(|point| parts.contains_key(&point.part) && known(point).is_some());
+    let (largest_mm, sigma_mm) = left().filter_map(known).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let places = left().map(|point| Place { file: point.file, line: point.line, column: 0 });
     let lines = numbered(&report.files, places)?;
     Some(Remainder { largest_mm, sigma_mm, lines })
 }
@@ -432,15 +430,28 @@ struct OnlyShape {
 const PLACE: f64 = 4.0;
 
 fn only_shape(report: &PathReport) -> Option<OnlyShape> {
-    let shape_mm = [report.registered_rms_mm(BEFORE)?, report.registered_rms_mm(AFTER)?];
-    let [before_mm, place_mm] = [rms(report, BEFORE)?, rms(report, AFTER)?];
+    only_shape_of(&report.cut().collect::<Vec<_>>())
+}
+
+/// The same of the points of a cut.
+fn only_shape_of(points: &[&PathPoint]) -> Option<OnlyShape> {
+    let shape_mm = [registered_rms_mm(points, BEFORE)?, registered_rms_mm(points, AFTER)?];
+    let [before_mm, place_mm] = [rms_of(points, BEFORE)?, rms_of(points, AFTER)?];
     let stays = place_mm > PLACE * shape_mm[1] && 2.0 * place_mm > before_mm;
     (shape_mm[1] < shape_mm[0] && stays).then_some(OnlyShape { shape_mm, place_mm })
 }
 
+fn registered_rms_mm(points: &[&PathPoint], side: Side) -> Option<f64> {
+    PathReport::registered_rms_mm_of(points.iter().copied(), side)
+}
+
 /// RMS of the deviation of the cut (mm).
 fn rms(report: &PathReport, side: Side) -> Option<f64> {
+    rms_of(&report.cut().collect::<Vec<_>>(), side)
+}
+
+fn rms_of(points: &[&PathPoint], side: Side) -> Option<f64> {
     let squares: Vec<f64> =
-        report.cut().filter_map(|p| side(p).map(|d| d.vector_mm.norm_squared())).collect();
+        points.iter().filter_map(|p| side(p).map(|d| d.vector_mm.norm_squared())).collect();
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }

@@ -4,6 +4,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_compensation::cell::Cell;
+use truegrind_compensation::cell::template::{TemplateProgram, cell_template};
 use truegrind_compensation::deviation::MotionStatus;
 use truegrind_compensation::frames::taught::contradictions;
 use truegrind_compensation::frames::taught::taught_tcp;
@@ -14,6 +15,8 @@ use truegrind_compensation::plan::solved_program::plan;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::Reason;
 use truegrind_programs::nc::setup::Setup;
+use truegrind_programs::rapid::Task;
+use truegrind_programs::reading::Language;
 use truegrind_programs::rewrite::RewriteOptions;
 
 use super::{
@@ -226,4 +229,24 @@ fn numbered_tools_and_offsets_are_found_by_number_and_by_name() {
         let task = truegrind_programs::nc::Task::read(&[("p.nc", text.as_bytes())], &Setup::default());
         assert_eq!(task.listing.opaque.len(), 1, "{wrong}");
     }
+}
+
+/// The origin of a work object that a positioner moves was asked for, and changes nothing.
+#[test]
+fn a_template_does_not_ask_for_the_origin_of_a_work_object_that_an_axis_moves() {
+    let source = "MODULE M
+PERS wobjdata turning:=[FALSE,FALSE,\"STN1\",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
+PERS wobjdata standing:=[FALSE,TRUE,\"\",[[400,0,300],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
+PROC main()
+MoveL [[0,0,10],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0\\WObj:=turning;
+MoveL [[0,0,10],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0\\WObj:=standing;
+ENDPROC
+ENDMODULE
+";
+    let task = Task::read(&[("p.mod", source.as_bytes())]);
+    let program = TemplateProgram { name: "p.mod", language: Language::Rapid, listing: &task.listing };
+    let made = cell_template(&[program], None);
+    assert_eq!(made.open, 1, "{}", made.text);
+    assert!(made.text.contains("# work object turning: the work object is moved by an external axis"));
+    assert!(made.text.contains("name = \"standing\""));
 }

@@ -127,7 +127,8 @@ impl Task<'_> {
             _ => ALL,
         };
         // After a call the position is that of the subprogram; a cycle starts at the tool position.
-        let moves = motion.kind != MotionKind::Unknown || motion.reason() == Some(Reason::Cycle);
+        let moves = motion.kind != MotionKind::Unknown
+            || matches!(motion.reason(), Some(Reason::Cycle | Reason::TiltsTool));
         own | if stays && moves && pinned_axes != 0 {
             pinned_axes & !self.axes_with_own_end(index)
         } else {

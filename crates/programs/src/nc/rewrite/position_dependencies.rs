@@ -412,7 +412,7 @@ fn may_move(motion: &Motion, slots: &WordSlots<'_>, dialect: Dialect) -> bool {
         Some(Reason::Subprogram) => false,
         // A word that was not read may have been that of an axis.
         Some(Reason::UnknownWord) => states_any || slots.mode.is_some() || dialect == Dialect::Heidenhain,
-        Some(Reason::Cycle) => true,
+        Some(Reason::Cycle | Reason::TiltsTool) => true,
         _ => states_any,
     }
 }

@@ -398,7 +398,7 @@ impl Interpreter<'_, '_> {
             Some(Some(frame)) if frame.position_mm.iter().any(|mm| mm.is_nan()) => Err(Reason::ToolUnknown),
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(self.state.tool.assigned.reason()),
-            None => self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown),
+            None => self.tools.get(&setup::plain(name)).copied().ok_or_else(|| unknown_tool(name)),
         }
     }
 
@@ -461,4 +461,9 @@ impl Interpreter<'_, '_> {
         self.frame_index = Some((name, self.state.programmable_frame, index));
         index
     }
+}
+
+/// Why a tool of which nothing is stated is unknown: one that is called with an allowance (`T1 DL+0.5`) is another one than without.
+fn unknown_tool(name: &str) -> Reason {
+    if name.contains(" DL") { Reason::LengthAllowance } else { Reason::ToolUnknown }
 }

@@ -202,7 +202,7 @@ impl<'s> Interpreter<'_, 's> {
                 // TURN moves the rotary axes to the plane, MOVE the linear ones too.
                 let moves = words.iter().any(|word| matches!(*word, b"TURN" | b"MOVE"));
                 if moves {
-                    self.list_left(block, "PLANE", Reason::Cycle);
+                    self.list_left(block, "PLANE", Reason::TiltsTool);
                 }
                 self.switch_transform(ModalGroup::TiltedPlane, second != b"RESET");
                 if moves {

@@ -11,7 +11,7 @@ use super::super::modal_group::{ARC_GROUPS, MOTION_GROUPS, ModalGroup, TOOL_GROU
 use super::super::modal_state::{MotionMode, OrientationMode, all_known};
 use super::super::preceding::Preceding;
 use super::super::syntax::{Word, WordValue};
-use super::turn::{Turn, turn_between};
+use super::turn::{Turn, turn_between, words_at_pole};
 use super::{Block, BlockArc, BlockContext, FlowPoint, Interpreter, StartDependency, StateEvent};
 use crate::motion::{
     MAX_POSITION_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
@@ -273,7 +273,8 @@ impl Interpreter<'_, '_> {
             motion.axis_turn = Some(Box::new(turn));
         }
         motion.insertable = splits && kind == MotionKind::Linear && !block.flags.other_axes;
-        motion.can_straighten = splits && arc.is_some() && !block.flags.opaque;
+        let at_pole = words_at_pole(&self.state.orientation, self.angles);
+        motion.can_straighten = splits && arc.is_some() && !block.flags.opaque && at_pole.is_none();
         motion.axis = arc.map(|block_arc| Box::new(block_arc.arc.plane.axis(block_arc.positive)));
         motion.by_radius = arc.is_some() && block.radius.is_some();
         let after = self.block_context(block, arc);
@@ -287,6 +288,7 @@ impl Interpreter<'_, '_> {
             self.note_unstated(block, mode, &to);
         }
         let index = self.push(motion, context);
+        self.listing.nc.at_poles.extend(at_pole.map(|words| (index, words)));
         self.state.preceding = Preceding::after(index);
         self.state.position = to;
         self.update_after_motion(block, mode, machine);

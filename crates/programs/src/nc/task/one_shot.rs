@@ -49,7 +49,7 @@ impl Interpreter<'_, '_> {
                 self.invalidate_pose();
             }
             Action::AlignToPlane => {
-                self.list_left(block, &code_name(code), Reason::Cycle);
+                self.list_left(block, &code_name(code), Reason::TiltsTool);
                 self.invalidate_pose();
             }
             Action::Call => self.subprogram(block, "G65"),

@@ -146,7 +146,7 @@ impl Interpreter<'_, '_> {
     fn swivel_cycle(&mut self, block: &Block<'_>, word: &Word<'_>) {
         let empty = matches!(word.value, WordValue::Arguments { first, end } if end == first + 2);
         if !empty {
-            self.list_left(block, "CYCLE800", Reason::Cycle);
+            self.list_left(block, "CYCLE800", Reason::TiltsTool);
         }
         self.switch_transform(ModalGroup::TiltedPlane, !empty);
     }

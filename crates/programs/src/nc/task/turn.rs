@@ -2,7 +2,7 @@
 //! one axis agree.
 
 use super::super::modal_state::{Orientation, OrientationMode, all_known};
-use super::super::orientation::Angles;
+use super::super::orientation::{Angles, WordsAtPole};
 use crate::motion::AxisTurn;
 
 /// How far the two ways of turning the tool along a line may lie apart (rad).
@@ -19,17 +19,29 @@ pub(super) enum Turn {
     Unknown,
 }
 
-pub(super) fn turn_between(from: &Orientation, to: &Orientation, angles: Option<Angles>) -> Turn {
-    let of = |orientation: &Orientation| match orientation.mode {
+/// The words of orientation in effect, with their convention.
+fn stated_words(orientation: &Orientation, angles: Option<Angles>) -> Option<(Angles, [f64; 3])> {
+    match orientation.mode {
         OrientationMode::Angles => Some((angles?, all_known(orientation.abc).ok()?)),
         OrientationMode::Rpy => Some((Angles::Wpr, all_known(orientation.rpy).ok()?)),
         OrientationMode::Vector | OrientationMode::Unknown(_) => None,
-    };
+    }
+}
+
+/// The words of orientation in effect, where they are near a pole of their convention.
+pub(super) fn words_at_pole(orientation: &Orientation, angles: Option<Angles>) -> Option<WordsAtPole> {
+    let (convention, words) = stated_words(orientation, angles)?;
+    WordsAtPole::of(convention, words)
+}
+
+pub(super) fn turn_between(from: &Orientation, to: &Orientation, angles: Option<Angles>) -> Turn {
     if to.mode == OrientationMode::Vector {
         return Turn::OneWay;
     }
     // Without a known start nothing is inserted.
-    let (Some((convention, start)), Some((other, end))) = (of(from), of(to)) else {
+    let (Some((convention, start)), Some((other, end))) =
+        (stated_words(from, angles), stated_words(to, angles))
+    else {
         return if from == to { Turn::OneWay } else { Turn::Unknown };
     };
     if convention != other {

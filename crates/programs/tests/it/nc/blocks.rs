@@ -57,13 +57,16 @@ fn motions_of_rotary_axes_are_listed() {
     check(
         Heidenhain,
         &[
-            (&format!("{tilt}\nPLANE RESET TURN FMAX\n{l}"), &[left(Cycle), left(Cycle), None]),
-            ("PLANE RESET MOVE ABST10 F500\nL X+10", &[left(Cycle), left(PositionUnknown)]),
+            (&format!("{tilt}\nPLANE RESET TURN FMAX\n{l}"), &[left(TiltsTool), left(TiltsTool), None]),
+            ("PLANE RESET MOVE ABST10 F500\nL X+10", &[left(TiltsTool), left(PositionUnknown)]),
             ("PLANE RESET STAY\nL X+10", &[None]),
         ],
     );
-    check(Fanuc, &[("G53.1\nX5.\nG53.6 R10.", &[left(Cycle), left(PositionUnknown), left(Cycle)])]);
-    check(Siemens, &[("CYCLE800(1,\"TC\",0,57,0,0,0)\nX5\nCYCLE800()", &[left(Cycle), left(Transformed)])]);
+    check(Fanuc, &[("G53.1\nX5.\nG53.6 R10.", &[left(TiltsTool), left(PositionUnknown), left(TiltsTool)])]);
+    check(
+        Siemens,
+        &[("CYCLE800(1,\"TC\",0,57,0,0,0)\nX5\nCYCLE800()", &[left(TiltsTool), left(Transformed)])],
+    );
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn each_group_ends_with_its_own_cancel_word() {
             (&format!("SCALE X2\nTRAFOOF\nTRAORI\n{S}\nSCALE\n{S}"), &[t, None]),
             (
                 &format!("CYCLE800(1,\"TC\",0,57,0,0,0)\nTRANS X10\nORIWKS\n{S}\nCYCLE800()\n{S}"),
-                &[left(Cycle), t, None],
+                &[left(TiltsTool), t, None],
             ),
             (&format!("DIAMON\n{S}\nDIAMOF\n{S}"), &[t, None]),
             (&format!("TOFRAME\nTRANS\n{S}\nTOROTOF\n{S}"), &[t, None]),
@@ -248,7 +248,13 @@ fn assigned_tools_and_offsets_override_the_setup() {
     );
     let l = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
     let named = left(ToolUnknown);
-    for call in ["\"MILL\" Z S1", "Q5 Z", "5.1 Z", "1 Z DL+5", "DL+2"] {
+    for (call, named) in [
+        ("\"MILL\" Z S1", named),
+        ("Q5 Z", named),
+        ("5.1 Z", named),
+        ("1 Z DL+5", left(LengthAllowance)),
+        ("DL+2", left(LengthAllowance)),
+    ] {
         check(Heidenhain, &[(&format!("TOOL CALL {call}\n{l}"), &[named])]);
     }
     check(Heidenhain, &[(&format!("TOOL CALL 1 Z S500 DL+0\n{l}\nTOOL CALL S900\n{l}"), &[None, None])]);

@@ -123,7 +123,7 @@ fn a_call_without_a_tool_keeps_tool_and_position() {
         &[
             ("TOOL CALL S500\nL X+11\nTOOL CALL Z S500 F200\nL Y+11", &[None, None]),
             ("TOOL CALL 1 Z S500\nL X+11", &[left(PositionUnknown)]),
-            ("TOOL CALL S500 DL+1\nL X+1 Y+1 Z+1 A+180 B+0 C+0", &[left(ToolUnknown)]),
+            ("TOOL CALL S500 DL+1\nL X+1 Y+1 Z+1 A+180 B+0 C+0", &[left(LengthAllowance)]),
             // A speed does not state which tool a subprogram has left.
             (
                 "LBL 1\nTOOL CALL S500\nL X+1 Y+1 Z+1 A+180 B+0 C+0\nTOOL CALL 2 Z\nCALL LBL 1 REP 2",
