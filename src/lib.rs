@@ -38,6 +38,8 @@
 //! crates, re-exported as [`arm`], [`programs`], [`surfaces`],
 //! [`estimation`], [`calibration`], [`compensation`], [`planning`], [`report`], [`papers`], [`math`].
 
+// What a file is that stands in the wrong place.
+pub mod file_kind;
 // Runs over many inputs on several machines.
 pub mod units;
 

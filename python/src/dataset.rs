@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::import::{self, cell::Cell};
-use truegrind::calibration::measurement::matching::prepare_rows;
-use truegrind::calibration::measurement::plausibility::implausible_payload;
+use truegrind::calibration::measurement::rows_of_robot::rows_of_robot;
+use truegrind::file_kind::FileKind;
 use truegrind::{Dataset, ImportOptions, Reading, Robot, Sensor, read_measurements};
 
 use crate::arrays::{Numbers, numbers};
@@ -154,13 +154,14 @@ impl PyDataset {
 
     /// Rows from arrays: logged controller angles (°) of shape (N, 6), and the readings of one sensor: ``length_mm`` (N,) of a
     /// cable, ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. Optional: Cartesian read-out of the
-    /// controller ``readout_mm`` (N, 3), ``time_h``, ``temperature_c`` and ``payload_kg`` (N,), approach directions (N, 6) in
+    /// controller ``readout_mm`` (N, 3), ``time_h``, ``temperature_c`` and ``payload_kg`` (N,), the payload's
+    /// centre of mass in the flange frame ``payload_centre_mm`` (N, 3), at the flange by default, approach directions (N, 6) in
     /// −1, 0, 1, number of the cable outlet ``anchor`` (N,), labels ``session`` and
     /// ``station``, where tracker or camera stood. NaN means unknown.
     #[staticmethod]
     #[pyo3(signature = (
         q_deg, *, length_mm = None, position_mm = None, quaternion_wxyz = None, readout_mm = None, time_h = None,
-        temperature_c = None, payload_kg = None, approach = None, anchor = None, session = None, station = None,
+        temperature_c = None, payload_kg = None, payload_centre_mm = None, approach = None, anchor = None, session = None, station = None,
         name = "numpy", allow_odd_units = false
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords, each with its own unit")]
@@ -174,6 +175,7 @@ impl PyDataset {
         time_h: Option<Object<'py, ArrayLike>>,
         temperature_c: Option<Object<'py, ArrayLike>>,
         payload_kg: Option<Object<'py, ArrayLike>>,
+        payload_centre_mm: Option<Object<'py, ArrayLike>>,
         approach: Option<Object<'py, ArrayLike>>,
         anchor: Option<Object<'py, ArrayLike>>,
         session: Option<Vec<Option<String>>>,
@@ -196,6 +198,7 @@ impl PyDataset {
             ("time_h", time_h, &["t"][..], true),
             ("temperature_c", temperature_c, &["temperature"][..], true),
             ("payload_kg", payload_kg, &["payload"][..], true),
+            ("payload_centre_mm", payload_centre_mm, &["payload_x", "payload_y", "payload_z"][..], true),
             ("approach", approach, &SIDES[..], true),
             ("anchor", anchor, &["anchor"][..], false),
         ] {
@@ -306,7 +309,17 @@ fn read(
     allow_odd_units: bool,
 ) -> PyResult<PyDataset> {
     let options = ImportOptions { sheet, allow_odd_units };
-    let read = || read_measurements(name, bytes, &options).map_err(Refusal::from);
+    let read = || {
+        read_measurements(name, bytes, &options).map_err(|error| {
+            let told = Refusal::from(error);
+            match FileKind::of(name, bytes) {
+                None | Some(FileKind::Measurements | FileKind::Empty) => told,
+                Some(kind) => {
+                    told.saying(format!("{name}: {}; expected measurements (.csv or .xlsx)", kind.text()))
+                }
+            }
+        })
+    };
     // Threads of its own, which Ctrl-C ends, take longer to start than a small file to read.
     let rows = if bytes.len() > MANY_BYTES { run(py, Some(1), None, read)? } else { py.detach(read)? };
     Ok(PyDataset { rows: Arc::new(rows), odd_units: allow_odd_units })
@@ -316,18 +329,10 @@ impl PyDataset {
     /// The rows with controller angles, with units checked against the robot. `angles`: `"logged"`, `"dh"`, or by default that of the
     /// robot file.
     pub(crate) fn of(&self, robot: &Robot, angles: Option<&str>) -> Result<Dataset, Refusal> {
-        let convention = match angles {
-            None => robot.sheet.joints.angles.into(),
-            Some(word) => {
-                let expected = "\"logged\" or \"dh\"";
-                word.parse::<AngleConvention>().map_err(|_| Refusal::argument("angles", word, expected))?
-            }
-        };
-        let name = &robot.sheet.name;
-        let rated = robot.sheet.payload_kg.filter(|_| !self.odd_units);
-        if let Some(suspicion) = rated.and_then(|rated| implausible_payload(&self.rows, rated)) {
-            return Err(suspicion.into());
-        }
-        Ok(prepare_rows((*self.rows).clone(), name, &robot.model, convention, self.odd_units)?)
+        let convention = angles.map(|word| {
+            let expected = "\"logged\" or \"dh\"";
+            word.parse::<AngleConvention>().map_err(|_| Refusal::argument("angles", word, expected))
+        });
+        Ok(rows_of_robot((*self.rows).clone(), robot, convention.transpose()?, self.odd_units)?)
     }
 }

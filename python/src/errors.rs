@@ -3,11 +3,17 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truegrind::arm::estimated;
+use truegrind::calibration::acceptance::AcceptError;
+use truegrind::calibration::diagnosis::measured::MeasuredError;
+use truegrind::calibration::exported::ExportError;
 use truegrind::calibration::identification::start::StartError;
+use truegrind::calibration::identification::stated_placement::PlacementError;
 use truegrind::calibration::measurement::matching::Mismatch;
 use truegrind::calibration::measurement::plausibility::PayloadSuspicion;
 use truegrind::calibration::measurement::stations::StationError;
 use truegrind::compensation::cell::CellError;
+use truegrind::compensation::condition::stated::ConditionError;
+use truegrind::planning::poses::settings::SettingsError;
 use truegrind::{
     CompensateError, IdentifyError, ImportError, ModelFileError, NominalMismatch, PlanError, RecipeError,
     RobotError, SolverError, TrackError, TrackStateError,
@@ -63,8 +69,41 @@ pub(crate) struct Refusal {
 }
 
 /// Command line options and the corresponding keywords.
-const KEYWORDS: [(&str, &str); 10] = [
+const KEYWORDS: [(&str, &str); 43] = [
     ("--allow-odd-units", "allow_odd_units=True"),
+    ("--cable-zero", "cable_zeros_mm"),
+    ("--touched-point", "touched_point"),
+    ("--touched-sigma", "touched_sigma_mm"),
+    ("--frame-sigma", "frame_sigma_mm"),
+    ("--payload-centre", "payload_centre_mm"),
+    ("--payload", "payload_kg"),
+    ("--temperature", "temperature_c"),
+    ("--to ur-yaml", "format=\"ur-yaml\""),
+    ("--index", "index"),
+    ("--margin", "margin_deg"),
+    ("--floor", "floor_mm"),
+    ("--settle", "settle_s"),
+    ("--approach", "approach_deg"),
+    ("--seconds-per-row", "seconds_per_row"),
+    ("--speed", "speed_mm_s"),
+    ("--sigma-angle", "sigma_angle_deg"),
+    ("--link-radius", "link_radius_mm"),
+    ("--clearance", "clearance_mm"),
+    ("--repeats", "repeats"),
+    ("--both-sides", "both_sides"),
+    ("--warm-up", "warm_up"),
+    ("--decisive", "decisive"),
+    ("--candidates", "candidates"),
+    ("--singularity", "singularity"),
+    ("--finding", "finding"),
+    ("--for", "diagnosis"),
+    ("--model", "model"),
+    ("--actual", "actual"),
+    ("--surface", "surface"),
+    ("--box", "box_mm"),
+    ("--range", "range_mm"),
+    ("--keep-out", "keep_out_mm"),
+    ("--poses", "poses"),
     ("--angles dh", "angles=\"dh\""),
     ("--base LINK --tip LINK", "truegrind.Robot(file, base=LINK, tip=LINK)"),
     ("--robot", "the robot"),
@@ -130,6 +169,20 @@ impl Refusal {
             fault.split_once(" at line ").and_then(|(_, rest)| rest.split([',', '\n']).next()?.parse().ok());
         let expected = fault.lines().map(str::trim).rfind(|line| !line.is_empty()).map(str::to_owned);
         Self { row: line, expected, ..self }
+    }
+
+    /// The argument that a message about an option begins with, and what was expected of it.
+    fn of_option(self) -> Self {
+        let name = self.message.split([':', ' ']).next().unwrap_or_default().to_owned();
+        let both = self.message.split_once(": expected ").map(|(found, expected)| {
+            let found = found.strip_prefix(&name).unwrap_or(found).trim();
+            (found.to_owned(), expected.to_owned())
+        });
+        let told = self.of_key(name);
+        match both {
+            Some((found, expected)) => told.with(found, expected),
+            None => told,
+        }
     }
 
     /// Key of a file, or name of an argument.
@@ -225,9 +278,89 @@ impl From<Mismatch> for Refusal {
                 let message = format!("{} (allow_odd_units=True accepts the rows anyway)", told.message);
                 told.saying(message)
             }
+            Mismatch::Payload(suspicion) => suspicion.into(),
             Mismatch::Station(StationError { file, rows, .. }) => told
                 .of_file(&file)
                 .with(format!("{rows} rows"), "at least four poses from each station, not on one line"),
+            _ => told,
+        }
+    }
+}
+
+impl From<PlacementError> for Refusal {
+    fn from(error: PlacementError) -> Self {
+        Self::new(Kind::Argument, &error).of_option()
+    }
+}
+
+impl From<SettingsError> for Refusal {
+    fn from(error: SettingsError) -> Self {
+        Self::new(Kind::Argument, &error).of_option()
+    }
+}
+
+impl From<MeasuredError> for Refusal {
+    fn from(error: MeasuredError) -> Self {
+        match error {
+            MeasuredError::Start(error) => error.into(),
+            MeasuredError::Placement(error) => error.into(),
+            MeasuredError::Diagnose(error) => error.into(),
+            other => Self::new(Kind::Fit, other),
+        }
+    }
+}
+
+impl From<ConditionError> for Refusal {
+    fn from(error: ConditionError) -> Self {
+        let told = Self::new(Kind::Argument, &error);
+        match error {
+            ConditionError::Payload { found } => {
+                told.of_key("payload_kg").with(found, "a mass in kg, from 0 to 3000")
+            }
+            ConditionError::CentreAlone => {
+                told.of_key("payload_kg").with("nothing", "the mass whose centre is stated")
+            }
+            ConditionError::OtherLoad { found, measured_kg, .. } => {
+                told.of_key("payload_kg").with(found, format!("{measured_kg} kg, as measured"))
+            }
+            ConditionError::Temperature { found } => {
+                told.of_key("temperature_c").with(found, "the temperature of an arm in °C")
+            }
+            ConditionError::NoGrowth { found } => {
+                told.of_key("temperature_c").with(found, "a model that grows with the temperature")
+            }
+            _ => told,
+        }
+    }
+}
+
+impl From<AcceptError> for Refusal {
+    fn from(error: AcceptError) -> Self {
+        let told = Self::new(Kind::Fit, &error);
+        match error {
+            AcceptError::Length { found, .. } => {
+                Self { kind: Kind::Argument, ..told }.with(found, "a length above 0 in mm, up to 100")
+            }
+            AcceptError::Angle { found, .. } => {
+                Self { kind: Kind::Argument, ..told }.with(found, "an angle above 0°, up to 180°")
+            }
+            AcceptError::RowsOfTheFit { file } => {
+                told.of_file(&file).with("rows of the fit", "other poses, at least 100")
+            }
+            AcceptError::PathsAlone { file } | AcceptError::PointTwice { file, .. } => told.of_file(&file),
+            AcceptError::StartError(error) => error.into(),
+            _ => told,
+        }
+    }
+}
+
+impl From<ExportError> for Refusal {
+    fn from(error: ExportError) -> Self {
+        let told = Self::new(Kind::Argument, &error);
+        match error {
+            ExportError::OtherMaker { of, .. } => told.of_key("format").with(of, "urdf, dh-csv or mdh-csv"),
+            ExportError::Links(error) => error.into(),
+            ExportError::Start(error) => error.into(),
             _ => told,
         }
     }

@@ -41,6 +41,19 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
     })
 }
 
+/// Refuses to write over an input.
+pub(crate) fn spare(path: &Path, inputs: &[&Path]) -> PyResult<()> {
+    let there = path.canonicalize().ok();
+    let same = |input: &&&Path| there.is_some() && input.canonicalize().ok() == there;
+    match inputs.iter().find(same) {
+        Some(input) => {
+            let message = format!("{}: is an input: give another place", input.display());
+            Err(Refusal::new(Kind::Program, message).of_file(&name(input)).into())
+        }
+        None => Ok(()),
+    }
+}
+
 fn part_of(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{}.{}.part", name(path), std::process::id()))
 }

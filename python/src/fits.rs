@@ -5,12 +5,12 @@ use std::sync::Arc;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use truegrind::calibration::diagnosis::transfer::new_rows;
+use truegrind::calibration::diagnosis::measured::diagnose_rows;
 use truegrind::calibration::identification::verdict::Limits;
 use truegrind::math::work::report_step;
 use truegrind::report::{diagnosis, format, identification};
 use truegrind::{
-    Dataset, DiagnoseOptions, Diagnosed, Identification, IdentifyOptions, Tolerance, diagnose, identify,
+    Dataset, DiagnoseOptions, Diagnosed, Identification, IdentifyOptions, Tolerance, identify,
     solver_by_name, split, starting_frames,
 };
 
@@ -18,6 +18,7 @@ use crate::dataset::PyDataset;
 use crate::errors::Refusal;
 use crate::interruptible::run;
 use crate::model::{PyModel, parameters};
+use crate::placement::Placement;
 use crate::robot::named;
 use crate::types::{Arrays, Dictionaries, Judgements, NamedRobot, Object, Progress, Typed};
 
@@ -118,14 +119,19 @@ impl PyIdentification {
 /// Fits an arm to measured poses. ``robot``: a Robot, a name from ``truegrind.robots()`` or a robot file. ``held_out``: share of rows
 /// held out to estimate the error. Tolerances (mm, °): prior σ of the links. ``sensor_scale_sigma_percent``: standard uncertainty of the
 /// sensor's scale (%); by default a fault of the scale is considered possible. ``angles``: ``"logged"`` or ``"dh"``, by default that of
-/// the robot file. ``progress`` is called with each step. The result does not depend on the number of threads.
+/// the robot file. ``sensor_frame``: frame of a tracker or camera in the robot base, x, y, z (mm) or x, y, z, qw, qx, qy, qz;
+/// ``outlets_mm`` and ``cable_zeros_mm``: outlets of cables in the base, and reading minus free length of each; ``touched_point``: hook or
+/// reflector on the flange. With ``frame_sigma_mm`` (and ``frame_sigma_deg``; by default 1 mm at 1 m) and ``touched_sigma_mm``, their standard
+/// deviations, the fit takes them as a prior, so that the placement of a path can be corrected; a placement that the readings contradict raises
+/// ``ArgumentError``. ``progress`` is called with each step. The result does not depend on the number of threads.
 #[pyfunction]
 #[pyo3(
     name = "identify",
     signature = (
         dataset, robot, *, method = "lm", held_out = 0.2, seed = 0, fuse_readout = true, limit_rmse_mm = None,
         limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, sensor_scale_sigma_percent = None,
-        angles: "Literal['logged', 'dh'] | None" = None, threads = None,
+        angles: "Literal['logged', 'dh'] | None" = None, sensor_frame = None, outlets_mm = None, cable_zeros_mm = None,
+        touched_point = None, frame_sigma_mm = None, frame_sigma_deg = None, touched_sigma_mm = None, threads = None,
         progress = None
     )
 )]
@@ -144,16 +150,33 @@ pub(crate) fn identify_(
     tolerance_angle_deg: Option<f64>,
     sensor_scale_sigma_percent: Option<f64>,
     angles: Option<&str>,
+    sensor_frame: Option<Vec<f64>>,
+    outlets_mm: Option<Vec<[f64; 3]>>,
+    cable_zeros_mm: Option<Vec<f64>>,
+    touched_point: Option<Vec<f64>>,
+    frame_sigma_mm: Option<f64>,
+    frame_sigma_deg: Option<f64>,
+    touched_sigma_mm: Option<f64>,
     threads: Option<i64>,
     progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyIdentification> {
+    let placement = Placement {
+        sensor_frame,
+        outlets_mm,
+        cable_zeros_mm,
+        touched_point,
+        frame_sigma_mm,
+        frame_sigma_deg,
+        touched_sigma_mm,
+    }
+    .stated()?;
     let robot = named(&robot)?;
     if !(held_out > 0.0 && held_out <= 0.9) {
         return Err(Refusal::argument("held_out", held_out, "a share above 0, up to 0.9").into());
     }
     let tolerance = tolerance(tolerance_length_mm, tolerance_angle_deg, sensor_scale_sigma_percent)?;
     for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
-        limit.map(|limit| positive(name, limit)).transpose()?;
+        limit.map(|limit| at_most(name, limit, 100.0)).transpose()?;
     }
     let options = IdentifyOptions {
         tolerance,
@@ -170,7 +193,10 @@ pub(crate) fn identify_(
         let rows = dataset.of(&robot, angles)?;
         let (name, nominal) = (&robot.sheet.name, &robot.model);
         report_step("placing the sensor");
+        let options = IdentifyOptions { stated_frames: placement.frames(&rows)?, ..options };
         let frames = starting_frames(&rows, nominal, &options.tolerance, options.fuse_readout)?;
+        let (tolerance, frames) = placement.prior([&options.tolerance; 2], frames, (&rows, nominal))?;
+        let options = IdentifyOptions { tolerance, ..options };
         let share = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
         let found = identify(&rows, name, nominal, &frames, &share, &options)?;
         Ok(PyIdentification { found: Arc::new(found), rows: Arc::new(rows) })
@@ -216,15 +242,15 @@ pub(crate) fn positive(name: &str, value: f64) -> Result<f64, Refusal> {
     Err(Refusal::argument(name, value, "a number above 0"))
 }
 
-/// A finite number that is not negative.
+/// A length above 0 that can be meant in mm.
 ///
 /// # Errors
 /// Names the argument.
-pub(crate) fn not_negative(name: &str, value: f64) -> Result<f64, Refusal> {
-    if value >= 0.0 && value.is_finite() {
-        return Ok(value);
+pub(crate) fn at_most(name: &str, mm: f64, most_mm: f64) -> Result<f64, Refusal> {
+    if mm > 0.0 && mm <= most_mm {
+        return Ok(mm);
     }
-    Err(Refusal::argument(name, value, "a number, 0 or above"))
+    Err(Refusal::argument(name, mm, &format!("a length above 0 in mm, up to {most_mm}")))
 }
 
 /// A count that is not negative, as the library counts.
@@ -294,7 +320,7 @@ impl PyDiagnosis {
     }
 
     /// The full result as JSON text, schema ``truegrind.diagnosis/1``: the bytes that ``truegrind diagnose --json`` writes.
-    fn to_json(&self) -> PyResult<String> {
+    pub(crate) fn to_json(&self) -> PyResult<String> {
         let counted = self.found.diagnosis.clone().with_rows_from_0(&self.rows);
         let value = serde_json::to_value(counted)
             .map_err(|error| Refusal::new(crate::errors::Kind::Defect, error))?;
@@ -326,14 +352,15 @@ impl PyDiagnosis {
 /// causes. ``blocks``: number of contiguous blocks held out in turn. Tolerances (mm, °): prior σ of the links.
 /// ``sensor_scale_sigma_percent``: standard uncertainty of the sensor's scale (%), such as 0.001 for a tracker that agreed with a scale
 /// bar; by default a fault of the scale is considered possible. ``also``: further datasets of the same arm, on which the models are tested
-/// with only the frames refitted.
+/// with only the frames refitted. ``sensor_frame`` to ``touched_sigma_mm``: as for ``identify``.
 #[pyfunction]
 #[pyo3(
     name = "diagnose",
     signature = (
         dataset, robot, *, alpha = 0.01, most = 20, blocks = 10, smooth = false, fuse_readout = true, limit_rmse_mm = None,
         limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, sensor_scale_sigma_percent = None, seed = 0,
-        also = Vec::new(), angles: "Literal['logged', 'dh'] | None" = None, threads = None, progress = None
+        also = Vec::new(), angles: "Literal['logged', 'dh'] | None" = None, sensor_frame = None, outlets_mm = None,
+        cable_zeros_mm = None, touched_point = None, frame_sigma_mm = None, frame_sigma_deg = None, touched_sigma_mm = None, threads = None, progress = None
     )
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
@@ -354,9 +381,26 @@ pub(crate) fn diagnose_(
     seed: i64,
     also: Vec<PyRef<'_, PyDataset>>,
     angles: Option<&str>,
+    sensor_frame: Option<Vec<f64>>,
+    outlets_mm: Option<Vec<[f64; 3]>>,
+    cable_zeros_mm: Option<Vec<f64>>,
+    touched_point: Option<Vec<f64>>,
+    frame_sigma_mm: Option<f64>,
+    frame_sigma_deg: Option<f64>,
+    touched_sigma_mm: Option<f64>,
     threads: Option<i64>,
     progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyDiagnosis> {
+    let placement = Placement {
+        sensor_frame,
+        outlets_mm,
+        cable_zeros_mm,
+        touched_point,
+        frame_sigma_mm,
+        frame_sigma_deg,
+        touched_sigma_mm,
+    }
+    .stated()?;
     let robot = named(&robot)?;
     if !(alpha > 0.0 && alpha <= 0.5) {
         return Err(Refusal::argument("alpha", alpha, "a probability above 0, up to 0.5").into());
@@ -364,11 +408,14 @@ pub(crate) fn diagnose_(
     if blocks < 2 {
         return Err(Refusal::argument("blocks", blocks, "at least 2").into());
     }
+    if !(1..=200).contains(&most) {
+        return Err(
+            Refusal::argument("most", most, "1 to 200 causes; identify fits geometry without any").into()
+        );
+    }
     let blocks = whole("blocks", blocks)?;
     for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
-        if let Some(limit) = limit {
-            positive(name, limit)?;
-        }
+        limit.map(|limit| at_most(name, limit, 100.0)).transpose()?;
     }
     let limits = Limits { rmse_mm: limit_rmse_mm, max_mm: limit_max_mm };
     let arm_tolerance = tolerance(tolerance_length_mm, tolerance_angle_deg, sensor_scale_sigma_percent)?;
@@ -381,16 +428,10 @@ pub(crate) fn diagnose_(
     run(py, threads, progress.as_deref(), || {
         report_step("checking units");
         let rows = dataset.of(&robot, angles)?;
-        let (name, nominal) = (&robot.sheet.name, &robot.model);
-        let frames = starting_frames(&rows, nominal, &options.tolerance, options.fuse_readout)?;
-        let mut found = diagnose(&rows, name, nominal, &frames, &options, &|step| report_step(step))?;
-        for other in others {
-            let other = other.of(&robot, angles)?;
-            let Some(other) = new_rows(&rows, &other, &mut found.diagnosis.notes) else { continue };
-            report_step(&format!("judging on {}", other.file));
-            let frames = starting_frames(&other, nominal, &options.tolerance, options.fuse_readout)?;
-            found.test_on(&other, &frames, &options.tolerance, options.fuse_readout);
-        }
+        let others =
+            others.into_iter().map(|other| other.of(&robot, angles)).collect::<Result<Vec<_>, _>>()?;
+        let arm = (robot.sheet.name.as_str(), &robot.model);
+        let found = diagnose_rows((&rows, &others), arm, &placement, &options)?;
         Ok(PyDiagnosis { found: Arc::new(found), rows: Arc::new(rows) })
     })
 }

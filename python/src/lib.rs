@@ -1,17 +1,21 @@
 //! truegrind as a Python module. It converts arguments, opens files and raises exceptions; all computation is in the library.
 
+mod acceptance;
 mod arm;
 mod arrays;
 mod dataset;
 mod errors;
+mod export;
 mod files;
 mod fits;
 mod interruptible;
 mod model;
+mod placement;
 mod plan;
 mod programs;
 mod robot;
 mod simulation;
+mod toolpath;
 mod track;
 mod types;
 
@@ -35,7 +39,11 @@ pub(crate) fn framed(page: &str) -> String {
 #[pymodule(gil_used = false)]
 mod _truegrind {
     #[pymodule_export]
+    use crate::acceptance::{PyAcceptance, accept_};
+    #[pymodule_export]
     use crate::dataset::PyDataset;
+    #[pymodule_export]
+    use crate::export::PyExport;
     #[pymodule_export]
     use crate::fits::{PyDiagnosis, PyIdentification, diagnose_, identify_};
     #[pymodule_export]
@@ -48,6 +56,8 @@ mod _truegrind {
     use crate::robot::{PyArm, PyRobot, catalogue, forward_of, inverse_of};
     #[pymodule_export]
     use crate::simulation::{PySimulation, simulate};
+    #[pymodule_export]
+    use crate::toolpath::{PyToolpath, cell_file, path_};
     #[pymodule_export]
     use crate::track::{PyTrack, track_};
 

@@ -7,15 +7,20 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use truegrind::arm::estimated::FlangePoint;
-use truegrind::{Estimated, Judgement, Pose, robots};
+use truegrind::calibration::exported::exported;
+use truegrind::file_kind::FileKind;
+use truegrind::{Estimated, Judgement, Pose, Robot, robots};
 
 use crate::arm::{Acting, Stated, forward, inverse};
 use crate::arrays::{joints, numbers, rows, shaped};
+use crate::dataset::PyDataset;
 use crate::errors::{Kind, Refusal};
+use crate::export::{PyExport, format_of};
 use crate::files;
+use crate::interruptible::run;
 use crate::robot::PyArm;
 use crate::types::{
-    Anything, ArrayLike, Bools, Dictionaries, Floats, Judgements, Object, Poses, Solutions, Typed,
+    Anything, ArrayLike, Bools, Dictionaries, Floats, Judgements, NamedRobot, Object, Poses, Solutions, Typed,
 };
 
 /// An estimated arm: the nominal arm, everything identified, and its covariance.
@@ -41,6 +46,11 @@ pub(crate) fn word(status: Judgement) -> &'static str {
 }
 
 impl PyModel {
+    /// The text of the model file.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+
     /// A newly fitted model.
     pub(crate) fn found(arm: &Estimated) -> Result<Self, Refusal> {
         let text = arm.to_toml()?;
@@ -56,7 +66,13 @@ impl PyModel {
     fn read(text: &str, name: &str) -> Result<Self, Refusal> {
         let arm = Estimated::from_toml(text).map_err(|error| {
             let message = error.to_string();
-            let message = format!("{name}: {}; a model file is what Model.save writes", message.trim_end());
+            let other = FileKind::of(name, text.as_bytes()).filter(|kind| *kind != FileKind::Model);
+            let message = match other {
+                Some(kind) => {
+                    format!("{name}: {}; expected a model file, which Model.save writes", kind.text())
+                }
+                None => format!("{name}: {}; a model file is what Model.save writes", message.trim_end()),
+            };
             Refusal::from(error).saying(message).of_file(name)
         })?;
         robots::check_catalogue_name(&arm.robot, &arm.nominal)
@@ -99,6 +115,27 @@ impl PyModel {
             _ => Ok(()),
         }
     }
+}
+
+/// The robot whose measurements are read for a model: the stated one, or that of the catalogue which the model names.
+///
+/// # Errors
+/// Another robot, or an arm that is not in the catalogue: only its robot file says how its logged angles count.
+pub(crate) fn measured_robot(model: &PyModel, robot: Option<&Bound<'_, PyAny>>) -> PyResult<Robot> {
+    let arm = &model.arm;
+    let Some(given) = robot else {
+        return Ok(robots::load(&arm.robot).map_err(|_| {
+            let expected = format!("the robot file of {}, which is not in the catalogue", arm.robot);
+            Refusal::argument("robot", "nothing", &expected)
+        })?);
+    };
+    let robot = crate::robot::named(given)?;
+    if !robot.sheet.name.eq_ignore_ascii_case(&arm.robot) {
+        let expected = format!("{}, for which {} was identified", arm.robot, model.name);
+        return Err(Refusal::argument("robot", &robot.sheet.name, &expected).into());
+    }
+    robots::check_same_links(&arm.nominal, &robot.model).map_err(Refusal::from)?;
+    Ok(robot)
 }
 
 /// A model or the path of a model file.
@@ -148,6 +185,30 @@ impl PyModel {
     fn save(&self, path: PathBuf, allow_doubtful: bool) -> PyResult<()> {
         self.allowed(allow_doubtful)?;
         files::write(&path, self.to_toml()?.as_bytes())
+    }
+
+    /// The links in another format: ``"urdf"``, ``"dh-csv"``, ``"mdh-csv"`` (Craig) or ``"ur-yaml"`` (kinematics for the ROS drivers of
+    /// Universal Robots). Effects beyond links are left out, as the notes of the result say. ``dataset``: measurements on which the error of
+    /// the exported links is evaluated, with only the sensor's frame fitted. ``robot``: the robot file, if the robot of the model is not in
+    /// the catalogue.
+    #[pyo3(signature = (format: "Literal['urdf', 'dh-csv', 'mdh-csv', 'ur-yaml']", *, dataset = None, robot = None))]
+    fn export(
+        &self,
+        py: Python<'_>,
+        format: &str,
+        dataset: Option<PyRef<'_, PyDataset>>,
+        robot: Option<Object<'_, NamedRobot>>,
+    ) -> PyResult<PyExport> {
+        let format = format_of(format)?;
+        let robot = match (&robot, &dataset) {
+            (None, None) => robots::load(&self.arm.robot).ok(),
+            _ => Some(measured_robot(self, robot.as_deref())?),
+        };
+        let dataset = dataset.as_deref();
+        run(py, None, None, || {
+            let rows = dataset.zip(robot.as_ref()).map(|(rows, robot)| rows.of(robot, None)).transpose()?;
+            Ok(PyExport { made: exported(&self.arm, format, robot.as_ref(), rows.as_ref())? })
+        })
     }
 
     /// Name of the robot.

@@ -1,20 +1,23 @@
 //! Measurement plans.
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use std::path::PathBuf;
+
 use pyo3::prelude::*;
 use truegrind::math::work::report_step;
+use truegrind::planning::poses::design::Index;
 use truegrind::planning::poses::program::{ProgramSettings, draft};
-use truegrind::planning::poses::rows::Noise;
+use truegrind::planning::poses::questions;
+use truegrind::planning::poses::settings::Settings;
 use truegrind::report::{format, planning};
-use truegrind::{
-    Frames, MeasurementSetup, Pose, PosesOptions, PosesPlan, Robot, Sensor, plan_poses, write_rapid,
-};
+use truegrind::{Frames, MeasurementSetup, PosesPlan, Robot, Sensor, plan_poses, write_rapid};
 
 use crate::errors::{Kind, Refusal};
-use crate::fits::{not_negative, positive, whole};
+use crate::files;
+use crate::fits::{PyDiagnosis, whole};
 use crate::interruptible::run;
+use crate::placement::Placement;
 use crate::robot::named;
-use crate::types::{Columns, NamedRobot, Object, Progress};
+use crate::types::{Columns, NamedDiagnosis, NamedRobot, Object, Progress};
 
 /// A measurement plan.
 #[pyclass(name = "Plan", module = "truegrind", frozen)]
@@ -23,8 +26,7 @@ pub(crate) struct PyPlan {
     robot: Robot,
     sensor: Sensor,
     frames: Frames,
-    speed_mm_s: f64,
-    settle_s: f64,
+    drive: ProgramSettings,
 }
 
 impl PyPlan {
@@ -44,13 +46,7 @@ impl PyPlan {
 
     /// The RAPID program that moves to the poses.
     fn program(&self) -> PyResult<String> {
-        let drive = ProgramSettings {
-            robot: self.robot.sheet.name.clone(),
-            travel_mm_s: self.speed_mm_s,
-            settle_s: self.settle_s,
-            ..ProgramSettings::default()
-        };
-        let bytes = write_rapid(&draft(&self.plan, &self.setup(), &drive))
+        let bytes = write_rapid(&draft(&self.plan, &self.setup(), &self.drive))
             .map_err(|error| Refusal::new(Kind::Plan, error))?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
@@ -78,31 +74,59 @@ impl PyPlan {
     }
 }
 
-/// Pose of the sensor: x, y, z (mm), or x, y, z, qw, qx, qy, qz.
-fn place(name: &str, numbers: &[f64]) -> Result<Pose, Refusal> {
-    let expected = "x, y, z (mm), or x, y, z, qw, qx, qy, qz of a unit quaternion";
-    let wrong = || Refusal::argument(name, format!("{numbers:?}"), expected);
-    match *numbers {
-        [x, y, z] => Ok(Pose::translation(x, y, z)),
-        [x, y, z, w, i, j, k] => {
-            let turn = Quaternion::new(w, i, j, k);
-            if !((turn.norm() - 1.0).abs() <= 0.01) {
-                return Err(wrong());
-            }
-            Ok(Pose::from_parts(Vector3::new(x, y, z).into(), UnitQuaternion::from_quaternion(turn)))
+/// What a diagnosis left open.
+///
+/// # Errors
+/// It is none, or of another robot, or has no such finding.
+fn left_open(
+    diagnosis: Option<&Bound<'_, PyAny>>,
+    finding: Option<usize>,
+    robot: &str,
+) -> PyResult<questions::Open> {
+    let Some(given) = diagnosis else {
+        if finding.is_some() {
+            return Err(Refusal::argument("diagnosis", "nothing", "the diagnosis of that finding").into());
         }
-        _ => Err(wrong()),
+        return Ok(questions::Open::default());
+    };
+    let (text, file) = match given.cast::<PyDiagnosis>() {
+        Ok(diagnosis) => (diagnosis.get().to_json()?, "diagnosis".to_owned()),
+        Err(_) => {
+            let path: PathBuf = given.extract().map_err(|_| {
+                Refusal::argument("diagnosis", given, "a Diagnosis, or the file that its to_json gives")
+            })?;
+            (files::read_text(&path, Kind::Plan)?, files::name(&path))
+        }
+    };
+    let open = questions::open(&text, finding)
+        .map_err(|error| Refusal::new(Kind::Plan, format!("{file}: {error}")).of_file(&file))?;
+    match questions::robot_of(&text) {
+        Some(found) if found != robot => {
+            let message = format!(
+                "{file}: the diagnosis is of robot {found}, but the plan is for {robot}: give that robot"
+            );
+            Err(Refusal::new(Kind::Plan, message).of_file(&file).with(found, robot).into())
+        }
+        _ => Ok(open),
     }
 }
 
 /// Chooses the poses to measure and makes a program that moves to them. ``sensor``: ``"cable"``, ``"position"`` or ``"pose"``. A cable
-/// needs its ``outlets_mm`` in the base; a tracker may stand anywhere. ``touched_point``: the hook or reflector on the flange.
+/// needs its ``outlets_mm`` in the base; a tracker may stand anywhere (``sensor_frame``: where it stands). ``touched_point``: the hook or
+/// reflector on the flange. ``poses``: number of different poses, 60 by default. ``diagnosis``: a ``Diagnosis``, or its JSON file, whose ambiguous
+/// and untested causes the poses shall tell apart; ``finding``: for the finding with this number alone. ``index``: ``"d"`` (D-optimality) or
+/// ``"o1"``. ``box_mm``: lower and upper corner of a box for the measured point; ``range_mm``: shortest and longest distance to the sensor;
+/// ``keep_out_mm``: boxes that the arm must not enter, two corners each; all in the base. ``repeats``, ``both_sides``, ``warm_up``: poses measured two
+/// more times, poses measured again from the other side, visits of one pose over the run. The other keywords are the options of ``truegrind plan``.
 #[pyfunction]
 #[pyo3(
     name = "plan",
     signature = (
-        robot, sensor: "Literal['cable', 'position', 'pose']", *, poses = 60, outlets_mm = None, sensor_frame = None, touched_point = None, sigma_mm = None,
-        sigma_angle_deg = 0.006, margin_deg = 6.0, floor_mm = 0.0, speed_mm_s = 200.0, settle_s = 2.0, candidates = 2000,
+        robot, sensor: "Literal['cable', 'position', 'pose']", *, poses = None, outlets_mm = None, cable_zeros_mm = None,
+        sensor_frame = None, touched_point = None, diagnosis = None, finding = None, index: "Literal['d', 'o1']" = "d",
+        sigma_mm = None, sigma_angle_deg = 0.006, box_mm = None, range_mm = None, clearance_mm = None, keep_out_mm = None,
+        floor_mm = 0.0, link_radius_mm = None, margin_deg = 6.0, singularity = 0.05, repeats = 4, both_sides = 12, warm_up = 8,
+        approach_deg = 3.0, settle_s = 2.0, seconds_per_row = 12.0, speed_mm_s = 200.0, decisive = 25.0, candidates = 2000,
         seed = 0, threads = None, progress = None
     )
 )]
@@ -111,16 +135,32 @@ pub(crate) fn plan_(
     py: Python<'_>,
     robot: Object<'_, NamedRobot>,
     sensor: &str,
-    poses: i64,
+    poses: Option<i64>,
     outlets_mm: Option<Vec<[f64; 3]>>,
+    cable_zeros_mm: Option<Vec<f64>>,
     sensor_frame: Option<Vec<f64>>,
     touched_point: Option<Vec<f64>>,
+    diagnosis: Option<Object<'_, NamedDiagnosis>>,
+    finding: Option<i64>,
+    index: &str,
     sigma_mm: Option<f64>,
     sigma_angle_deg: f64,
-    margin_deg: f64,
+    box_mm: Option<[[f64; 3]; 2]>,
+    range_mm: Option<[f64; 2]>,
+    clearance_mm: Option<f64>,
+    keep_out_mm: Option<Vec<[[f64; 3]; 2]>>,
     floor_mm: f64,
-    speed_mm_s: f64,
+    link_radius_mm: Option<f64>,
+    margin_deg: f64,
+    singularity: f64,
+    repeats: i64,
+    both_sides: i64,
+    warm_up: i64,
+    approach_deg: f64,
     settle_s: f64,
+    seconds_per_row: f64,
+    speed_mm_s: f64,
+    decisive: f64,
     candidates: i64,
     seed: i64,
     threads: Option<i64>,
@@ -135,52 +175,52 @@ pub(crate) fn plan_(
             return Err(Refusal::argument("sensor", other, "\"cable\", \"position\" or \"pose\"").into());
         }
     };
-    if !(4..=2000).contains(&poses) {
-        return Err(Refusal::argument("poses", poses, "4 to 2000; about 50 to 100 are usual").into());
-    }
-    if candidates > 100_000 {
-        return Err(Refusal::argument("candidates", candidates, "at most 100000; 2000 are usual").into());
-    }
-    let (poses, candidates): (usize, usize) = (whole("poses", poses)?, whole("candidates", candidates)?);
-    let outlets = outlets_mm.unwrap_or_default();
-    if sensor == Sensor::Cable && outlets.is_empty() {
-        let expected = "where in the robot's base the cable comes out, x, y, z (mm), once for each cable";
-        return Err(Refusal::argument("outlets_mm", "nothing", expected).into());
-    }
-    let mut frames = Frames::at_origin(outlets.len().max(1));
-    for (to, outlet) in frames.outlets_mm.iter_mut().zip(&outlets) {
-        *to = Vector3::from(*outlet);
-    }
-    if let Some(point) = &touched_point {
-        frames.flange_from_target = place("touched_point", point)?;
-    }
-    if let Some(frame) = &sensor_frame {
-        frames.base_from_sensor = place("sensor_frame", frame)?;
-    }
-    let mut options = PosesOptions::usual(&robot.model, sensor, sensor_frame.is_some());
-    let reading_mm = sigma_mm.unwrap_or(options.noise.reading_mm);
-    options.poses = poses;
-    options.noise = Noise {
-        reading_mm: positive("sigma_mm", reading_mm)?,
-        reading_rad: positive("sigma_angle_deg", sigma_angle_deg)?.to_radians(),
+    let index = match index {
+        "d" => Index::D,
+        "o1" => Index::O1,
+        other => return Err(Refusal::argument("index", other, "\"d\" or \"o1\"").into()),
     };
-    options.candidates = candidates.max(poses);
-    let margin_rad = not_negative("margin_deg", margin_deg)?.to_radians();
-    options.bounds.margin_rad = margin_rad.max(options.visits.approach_rad);
-    if !floor_mm.is_finite() {
-        return Err(Refusal::argument("floor_mm", floor_mm, "a height in mm").into());
-    }
-    options.bounds.space.floor_mm = Some(floor_mm);
-    options.seed = whole("seed", seed)?;
-    let settle_s = not_negative("settle_s", settle_s)?;
-    let speed_mm_s = positive("speed_mm_s", speed_mm_s)?;
+    let sight_is_known = sensor_frame.is_some();
+    let placement =
+        Placement { sensor_frame, outlets_mm, cable_zeros_mm, touched_point, ..Placement::default() };
+    let frames = placement.stated()?.planned(sensor).map_err(Refusal::from)?;
+    let finding = finding.map(|number| whole("finding", number)).transpose()?;
+    let settings = Settings {
+        poses: poses.map(|poses| whole("poses", poses)).transpose()?,
+        index,
+        sigma_mm,
+        sigma_angle_deg,
+        box_mm,
+        distance_mm: range_mm,
+        clearance_mm,
+        keep_out_mm: keep_out_mm.unwrap_or_default(),
+        floor_mm,
+        link_radius_mm,
+        margin_deg,
+        singularity,
+        repeats: whole("repeats", repeats)?,
+        both_sides: whole("both_sides", both_sides)?,
+        warm_up: whole("warm_up", warm_up)?,
+        approach_deg,
+        settle_s,
+        seconds_per_row,
+        speed_mm_s,
+        decisive,
+        candidates: whole("candidates", candidates)?,
+        seed: whole("seed", seed)?,
+        open: left_open(diagnosis.as_deref(), finding, &robot.sheet.name)?,
+        one_finding: finding.is_some(),
+    };
+    let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
+    let options = settings.options(&robot, &setup, sight_is_known).map_err(Refusal::from)?;
+    let drive = settings.program(&robot, &options);
     run(py, threads, progress.as_deref(), || {
-        report_step(&format!("choosing {poses} of {candidates} poses"));
+        report_step(&format!("choosing among {} poses", options.candidates));
         let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
         let plan = plan_poses(&setup, &options).map_err(|error| {
             let message = format!("{}: {error}", robot.sheet.name);
             Refusal::from(error).saying(message)
         })?;
-        Ok(PyPlan { plan, robot, sensor, frames, speed_mm_s, settle_s })
+        Ok(PyPlan { plan, robot, sensor, frames, drive })
     })
 }

@@ -9,10 +9,12 @@ use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::cell::robot_match::{
     UnreachableMotions, cell_robot_mismatch, program_robot_mismatch, unreachable_motions,
 };
+use truegrind::compensation::condition::stated::StatedCondition;
 use truegrind::compensation::deviation::files_of;
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
 use truegrind::compensation::risk::placement::Placement;
+use truegrind::file_kind::FileKind;
 use truegrind::math::work::report_step;
 use truegrind::programs::rapid::task_list;
 use truegrind::report::compensation::{self as view, ProgramFile};
@@ -23,10 +25,9 @@ use truegrind::{
     compensate, verify,
 };
 
-use crate::arm::Stated;
 use crate::errors::{Kind, Refusal};
 use crate::files;
-use crate::fits::positive;
+use crate::fits::at_most;
 use crate::interruptible::run;
 use crate::model::{PyModel, named};
 use crate::robot::PyArm;
@@ -41,13 +42,13 @@ pub(crate) struct Sources {
 
 impl Sources {
     /// The parsed program; file names without folders, as on the controller.
-    fn task<'s>(&'s self, setup: &NcSetup) -> Program<'s> {
+    pub(crate) fn task<'s>(&'s self, setup: &NcSetup) -> Program<'s> {
         let plain: Vec<(&str, &[u8])> =
             self.files.iter().map(|(name, bytes)| (last(name), bytes.as_slice())).collect();
         Program::read(&plain, setup)
     }
 
-    fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         self.files.iter().map(|(name, _)| last(name)).collect::<Vec<_>>().join(", ")
     }
 }
@@ -144,7 +145,16 @@ impl Place {
             Some(given) => {
                 let (text, path) = text(given, Kind::Cell)?;
                 let name = path.as_ref().map_or("cell".to_owned(), |path| path.display().to_string());
+                let kind = FileKind::of(&name, text.as_bytes());
+                if kind == Some(FileKind::Empty) {
+                    let message = format!("{name}: this file is empty; expected a cell file (cell_file)");
+                    return Err(Refusal::new(Kind::Cell, message).of_file(&name).into());
+                }
                 let cell = Cell::from_toml(&text).map_err(|error| {
+                    if let Some(other) = kind.filter(|kind| *kind != FileKind::Cell) {
+                        let message = format!("{name}: {}; expected a cell file (cell_file)", other.text());
+                        return Refusal::from(error).saying(message).of_file(&name);
+                    }
                     let message = format!(
                         "{name}: {}; a cell file lists [[tool]] and [[wobj]]",
                         error.to_string().trim_end()
@@ -167,7 +177,7 @@ impl Place {
     }
 }
 
-fn read_surface(path: &Path) -> PyResult<SurfaceFile> {
+pub(crate) fn read_surface(path: &Path) -> PyResult<SurfaceFile> {
     let bytes = files::read(path)?;
     let name = path.display().to_string();
     let resolve = |mesh: &str| {
@@ -321,13 +331,14 @@ impl PyCompensation {
 /// Corrects a program so that the real arm follows the intended path. ``program``: a path, a list of paths (modules of one task) or a
 /// dictionary of names and texts. ``cell``: a cell file or its text. ``surface``: a surface file. ``placement``: correct shape and place
 /// of the path in each work object ("absolute"), its shape alone ("shape"), or the place only where the model knows it better than it
-/// is off ("auto"). A cut is left unchanged if its correction makes it worse with a probability above ``max_risk``. Nothing is written;
+/// is off ("auto"). ``temperature_c``: temperature of the arm while the program runs, if the model says how its links grow; by default
+/// that of the measurement. A cut is left unchanged if its correction makes it worse with a probability above ``max_risk``. Nothing is written;
 /// use ``Compensation.save``.
 #[pyfunction]
 #[pyo3(
     name = "compensate",
     signature = (
-        program, model, *, cell = None, surface = None, payload_kg = None, payload_centre_mm = None,
+        program, model, *, cell = None, surface = None, payload_kg = None, payload_centre_mm = None, temperature_c = None,
         emit: "Literal['targets', 'joints']" = "targets", circles: "Literal['keep', 'segments']" = "keep", tolerance_mm = 0.05,
         max_correction_mm = 10.0, partial = false, placement: "Literal['auto', 'shape', 'absolute']" = "auto", max_risk = 0.1,
         joint_targets = false, again = false, allow_doubtful = false, threads = None, progress = None
@@ -342,6 +353,7 @@ pub(crate) fn compensate_(
     surface: Option<PathBuf>,
     payload_kg: Option<f64>,
     payload_centre_mm: Option<[f64; 3]>,
+    temperature_c: Option<f64>,
     emit: &str,
     circles: &str,
     tolerance_mm: f64,
@@ -363,7 +375,7 @@ pub(crate) fn compensate_(
     estimated.allowed(allow_doubtful)?;
     let sources = sources(&program)?;
     let place = Place::read(cell.as_deref(), surface)?;
-    let stated = Stated { payload_kg, payload_centre_mm, ..Stated::default() };
+    let stated = StatedCondition { payload_kg, payload_centre_mm, temperature_c };
     let options = CompensateOptions {
         emit: match emit {
             "targets" => Emit::Targets,
@@ -375,8 +387,12 @@ pub(crate) fn compensate_(
             "segments" => Circles::Segments,
             other => return Err(Refusal::argument("circles", other, "\"keep\" or \"segments\"").into()),
         },
-        tolerance_mm: positive("tolerance_mm", tolerance_mm)?,
-        max_correction_mm: positive("max_correction_mm", max_correction_mm)?,
+        tolerance_mm: at_most("tolerance_mm", tolerance_mm, CompensateOptions::MAX_TOLERANCE_MM)?,
+        max_correction_mm: at_most(
+            "max_correction_mm",
+            max_correction_mm,
+            CompensateOptions::MAX_CORRECTION_MM,
+        )?,
         joint_targets,
         cuts: if partial { Cuts::Partial } else { Cuts::Whole },
         placement: match placement {
@@ -389,7 +405,7 @@ pub(crate) fn compensate_(
             }
         },
         max_risk,
-        condition: stated.on(&estimated.arm.condition)?,
+        condition: stated.on(Some(&estimated.arm)).map_err(Refusal::from)?,
         points: true,
         ..CompensateOptions::default()
     };
@@ -540,14 +556,15 @@ impl PyDeviation {
 }
 
 /// Deviation of a program under a model; nothing is rewritten. With ``intended``, the original program defines the intended path, and
-/// ``program`` is its corrected version; ``tolerance_mm`` is the largest deviation of its path between two targets. With ``actual`` (an
+/// ``program`` is its corrected version; ``tolerance_mm`` is the largest deviation of its path between two targets. ``temperature_c``:
+/// as for ``compensate``. With ``actual`` (an
 /// ``Arm`` of a simulation) the programs are run on that arm.
 #[pyfunction]
 #[pyo3(
     name = "deviation",
     signature = (
         program, model, *, intended = None, actual = None, tolerance_mm = 0.05, cell = None, surface = None,
-        payload_kg = None, payload_centre_mm = None, threads = None, progress = None
+        payload_kg = None, payload_centre_mm = None, temperature_c = None, threads = None, progress = None
     )
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
@@ -562,17 +579,18 @@ pub(crate) fn deviation_(
     surface: Option<PathBuf>,
     payload_kg: Option<f64>,
     payload_centre_mm: Option<[f64; 3]>,
+    temperature_c: Option<f64>,
     threads: Option<i64>,
     progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyDeviation> {
-    let tolerance_mm = positive("tolerance_mm", tolerance_mm)?;
+    let tolerance_mm = at_most("tolerance_mm", tolerance_mm, CompensateOptions::MAX_TOLERANCE_MM)?;
     let mut kept = None;
     let estimated = named(&model, &mut kept)?;
     let programs = sources(&program)?;
     let originals = intended.as_deref().map(sources).transpose()?;
     let place = Place::read(cell.as_deref(), surface)?;
-    let stated = Stated { payload_kg, payload_centre_mm, ..Stated::default() };
-    let condition = stated.on(&estimated.arm.condition)?;
+    let stated = StatedCondition { payload_kg, payload_centre_mm, temperature_c };
+    let condition = stated.on(Some(&estimated.arm)).map_err(Refusal::from)?;
     let actual = actual.as_deref();
     let originals = originals.as_ref();
     let task = Run { estimated, actual, programs: &programs, originals, condition, tolerance_mm };

@@ -8,7 +8,7 @@ use truegrind::{Alarm, TrackOptions, TrackState, Tracker, robots};
 
 use crate::dataset::PyDataset;
 use crate::errors::{Kind, Refusal};
-use crate::fits::{positive, whole};
+use crate::fits::{at_most, whole};
 use crate::interruptible::run;
 use crate::model::{self, PyModel};
 use crate::types::{Dictionaries, NamedModel, Object, OneOrMoreDatasets, Progress};
@@ -103,11 +103,14 @@ pub(crate) fn track_(
     };
     let given: Vec<&PyDataset> = given.iter().map(|dataset| &**dataset).collect();
     let mut options = TrackOptions {
-        sigma_mm: sigma_mm.map(|sigma| positive("sigma_mm", sigma)).transpose()?,
+        sigma_mm: sigma_mm.map(|sigma| at_most("sigma_mm", sigma, 10.0)).transpose()?,
         ..TrackOptions::default()
     };
     if let Some(poses) = first_poses {
-        options.first_poses = whole("first_poses", poses.max(4))?;
+        if poses < 4 {
+            return Err(Refusal::argument("first_poses", poses, "at least 4").into());
+        }
+        options.first_poses = whole("first_poses", poses)?;
     }
     run(py, threads, progress.as_deref(), || {
         let arm = &estimated.arm;

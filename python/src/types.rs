@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::{PyTypeInfo, type_hint_identifier, type_hint_subscript, type_hint_union};
 
 use crate::dataset::PyDataset;
+use crate::fits::PyDiagnosis;
 use crate::model::PyModel;
 use crate::robot::{PyArm, PyRobot};
 
@@ -91,11 +92,13 @@ hints! {
     Bools = type_hint_subscript!(NDARRAY, type_hint_identifier!("numpy", "bool_"));
     Columns = type_hint_subscript!(DICT, STR, type_hint_subscript!(LIST, ANY));
     Counts = type_hint_subscript!(DICT, STR, type_hint_identifier!("builtins", "int"));
+    Decisions = type_hint_subscript!(LITERAL, text("accepted"), text("refused"), text("undecided"), text("not-evaluated"));
     Dictionaries = type_hint_subscript!(LIST, type_hint_subscript!(DICT, STR, ANY));
     Files = type_hint_subscript!(DICT, STR, BYTES);
     Floats = type_hint_subscript!(NDARRAY, type_hint_identifier!("numpy", "float64"));
     Judgements = type_hint_subscript!(LITERAL, text("pass"), text("doubtful"), text("fail"), text("not-evaluated"));
     NamedArm = type_hint_union!(PyRobot::TYPE_HINT, PyModel::TYPE_HINT, PyArm::TYPE_HINT);
+    NamedDiagnosis = type_hint_union!(PyDiagnosis::TYPE_HINT, PATH);
     NamedModel = type_hint_union!(PyModel::TYPE_HINT, PATH);
     NamedRobot = type_hint_union!(PyRobot::TYPE_HINT, PATH);
     OneOrMoreDatasets =

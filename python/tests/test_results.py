@@ -32,6 +32,7 @@ def test_the_lines_of_the_readme_run(tmp_path, monkeypatch):
         "arm.urdf": root / "crates" / "arm" / "tests" / "data" / "tool-turned.urdf",
     }.items():
         (tmp_path / name).write_bytes(source.read_bytes())
+    (tmp_path / "later.csv").write_text(tg.simulate(DATA / "irb120-tracker.toml", seed=9).csv, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     found: dict[str, object] = {}
     exec(compile(lines, "README.md", "exec"), found)

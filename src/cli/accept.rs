@@ -86,14 +86,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         ..DataArguments::of(arguments.data.clone(), robot)
     };
     let (_, dataset) = read(&data)?;
-    arguments.stated.refuse_point_alone()?;
-    arguments.stated.refuse_frame_alone()?;
+    outputs.refuse_other_kinds()?;
     let options = Options {
         tolerance_mm: arguments.tolerance,
         uncertainty_mm: arguments.sensor_uncertainty,
         tolerance_rad: arguments.tolerance_angle.map(f64::to_radians),
         uncertainty_rad: arguments.sensor_uncertainty_angle.map(f64::to_radians),
-        frames: arguments.stated.frames(&dataset)?,
+        frames: arguments.stated.placement()?.frames_of_both(&dataset)?,
         seed: arguments.common.seed,
     };
     let work = Spinner::start(format!("judging {} on {} rows", arm.robot, dataset.rows.len()));

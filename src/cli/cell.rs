@@ -62,6 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         print_message(format_args!("note: {comment}"));
     }
     if asking.iter().all(|program| program.listing.motions.is_empty()) {
+        read.iter().try_for_each(Programs::refuse_other_kinds)?;
         bail!("these programs contain no motion, so they use no tool and no work object");
     }
     let made = cell_template(&asking, robot.as_ref().map(|robot| robot.sheet.name.as_str()));

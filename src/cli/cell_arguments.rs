@@ -1,6 +1,5 @@
 //! Options that describe the cell a program runs in, shared by `compensate`, `deviation` and `view`.
 
-use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
@@ -9,24 +8,22 @@ use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
 use truegrind::compensation::cell::{Cell, Used};
-use truegrind::compensation::condition::other_load::is_other_load;
-use truegrind::compensation::condition::overload::{overload, rated_payload_kg, stated_overload};
-use truegrind::compensation::condition::warmth::growth_per_k;
+use truegrind::compensation::condition::overload::stated_overload;
+use truegrind::compensation::condition::stated::StatedCondition;
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
+use truegrind::file_kind::FileKind;
 use truegrind::programs::motion::Listing;
 use truegrind::programs::motion::load::Loads;
 use truegrind::programs::reading::Program;
 use truegrind::surfaces::SurfaceFile;
 
 use super::files;
+use super::inputs;
 use super::terminal::print_message;
 
-/// Payloads above this are typing errors (kg).
-const MAX_PAYLOAD_KG: f64 = 3000.0;
-
-/// Temperatures of an arm; others are typing errors (°C).
-const TEMPERATURES_C: RangeInclusive<f64> = -40.0..=120.0;
+/// What `--cell` reads.
+const CELL_FILE: &str = "a cell file, as `truegrind cell PROGRAM… -o CELL.toml` writes it";
 
 /// Cell, surface, payload and temperature.
 #[derive(Debug, Clone, Args)]
@@ -61,70 +58,23 @@ impl CellArguments {
         &self,
         model: Option<&Estimated>,
     ) -> anyhow::Result<(Cell, Option<SurfaceFile>, Condition)> {
-        if let Some(kg) = self.payload
-            && !(0.0..=MAX_PAYLOAD_KG).contains(&kg)
-        {
-            bail!("--payload {kg}: expected a mass in kg, from 0 to {MAX_PAYLOAD_KG}");
+        let payload_centre_mm = self.payload_centre.as_deref();
+        let payload_centre_mm = payload_centre_mm
+            .map(|text| super::stated_frames::triple("--payload-centre", text))
+            .transpose()?;
+        let stated =
+            StatedCondition { payload_kg: self.payload, payload_centre_mm, temperature_c: self.temperature };
+        let condition = stated.on(model)?;
+        if let Some(note) = stated.overload_note(model) {
+            print_message(format_args!("note: {note}"));
         }
-        self.refuse_other_load(model)?;
-        self.note_overload(model);
         let cell = self.read_cell()?;
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
         let cell = match &surface {
             Some(surface) => cell.with_surface(surface)?,
             None => cell,
         };
-        let mut condition = model.map(|m| m.condition).unwrap_or_default();
-        condition.payload_kg = self.payload.or(condition.payload_kg);
-        self.refuse_temperature(model)?;
-        condition.temperature_c = self.temperature.or(condition.temperature_c);
-        if let Some(text) = &self.payload_centre {
-            condition.payload_centre_mm = super::stated_frames::triple("--payload-centre", text)?;
-        }
         Ok((cell, surface, condition))
-    }
-
-    /// Refuses a temperature that no arm has, or that the model cannot follow.
-    fn refuse_temperature(&self, model: Option<&Estimated>) -> anyhow::Result<()> {
-        let Some(celsius) = self.temperature else { return Ok(()) };
-        if !TEMPERATURES_C.contains(&celsius) {
-            bail!(
-                "--temperature {celsius}: expected the temperature of the arm in °C, from {} to {}",
-                TEMPERATURES_C.start(),
-                TEMPERATURES_C.end()
-            );
-        }
-        if model.is_some_and(|model| growth_per_k(model).is_none()) {
-            bail!(
-                "--temperature {celsius}: the model does not say how the arm grows per kelvin: measure it cold and warm, with its temperature in the \
-                 column `temperature`, or omit --temperature"
-            );
-        }
-        Ok(())
-    }
-
-    /// Refuses a payload that the model cannot follow.
-    fn refuse_other_load(&self, model: Option<&Estimated>) -> anyhow::Result<()> {
-        let (Some(kg), Some(model)) = (self.payload, model) else { return Ok(()) };
-        if !is_other_load(kg, model) {
-            return Ok(());
-        }
-        let measured_kg = model.condition.payload_kg.unwrap_or(0.0);
-        bail!(
-            "--payload {kg}: the masses of {} are not known, so its deflection was identified for the load of the measurement ({measured_kg} kg) and \
-             follows no other: measure with {kg} kg on the flange, or omit --payload and accept the error from the different load",
-            model.robot
-        )
-    }
-
-    /// Notes a payload above the rated one of the catalogue: perhaps it is in another unit.
-    fn note_overload(&self, model: Option<&Estimated>) {
-        let Some(robot) = model.map(|arm| arm.robot.as_str()) else { return };
-        if let (Some(kg), Some(rated)) = (self.payload, rated_payload_kg(robot))
-            && kg > rated
-        {
-            print_message(format_args!("note: --payload {kg}: {}", overload(kg, robot, rated)));
-        }
     }
 
     /// Notes the loads of a program that are above the rated payload.
@@ -138,12 +88,17 @@ impl CellArguments {
 
     fn read_cell(&self) -> anyhow::Result<Cell> {
         let Some(path) = &self.cell else { return Ok(Cell::default()) };
-        let cell = Cell::from_toml(&files::read_text(path)?).map_err(|e| {
-            anyhow!(
+        let text = files::read_text(path)?;
+        if text.trim().is_empty() {
+            bail!("{}: this file is empty; expected {CELL_FILE}", path.display());
+        }
+        let cell = Cell::from_toml(&text).map_err(|e| {
+            let told = anyhow!(
                 "{}: {}; a cell file lists [[tool]] and [[wobj]]",
                 path.display(),
                 e.to_string().trim_end()
-            )
+            );
+            inputs::other_kind_or(path, &[FileKind::Cell], CELL_FILE, told)
         })?;
         if let [first, rest @ ..] = cell.open.as_slice() {
             let more = match rest.len() {
@@ -155,6 +110,14 @@ impl CellArguments {
         }
         Ok(cell)
     }
+}
+
+/// Refuses a length that cannot be meant in millimetres.
+pub(super) fn check_length(option: &str, mm: f64, most_mm: f64) -> anyhow::Result<()> {
+    if mm > 0.0 && mm <= most_mm {
+        return Ok(());
+    }
+    bail!("{option} {mm}: expected a length above 0 in mm, up to {most_mm} (50 µm are 0.05)")
 }
 
 /// Notes entries of the cell file that no program uses; silent if any program could not be examined.

@@ -6,6 +6,7 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::arm::model::Model;
 use truegrind::calibration::measurement::dataset::Dataset;
+use truegrind::file_kind::FileKind;
 use truegrind::papers::experiment::{Experiment, Kind};
 use truegrind::papers::grinding::Actual;
 use truegrind::papers::protocol::Options;
@@ -83,7 +84,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         bail!("--experiment is missing: `truegrind compare --list` lists the experiments");
     };
     let mut inputs: Vec<&Path> = arguments.data.as_deref().into_iter().collect();
-    let is_file = name.ends_with(".toml");
+    // A file under any name but that of a shipped experiment; what it is, is told where it is read.
+    let is_file = name.ends_with(".toml") || name.contains('/') || Path::new(name).is_file();
     if is_file {
         inputs.push(Path::new(name));
     }
@@ -91,7 +93,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     targets.extend(arguments.times.as_deref());
     Batch::check(&inputs, &targets)?;
     let experiment = if is_file {
-        Experiment::parse(&files::read_text(Path::new(name))?, name)?
+        let text = files::read_text(Path::new(name))?;
+        Experiment::parse(&text, name).map_err(|e| {
+            inputs::other_kind_or(Path::new(name), &[FileKind::Experiment], "an experiment (.toml)", e)
+        })?
     } else {
         Experiment::by_name(name)?
     };
@@ -104,6 +109,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let seed = arguments.common.seed;
     let mut origin = Origin { seed, timings: arguments.timings, ..Origin::default() };
     let measured = if experiment.takes_rows() { Some(measured(arguments, &experiment)?) } else { None };
+    arguments.outputs.refuse_other_kinds()?;
     if let Some(measured) = &measured {
         origin.file = Some(measured.dataset.file.clone());
         origin.sha256 = Some(measured.dataset.sha256.clone());

@@ -88,6 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     {
         robot_match::note_other_language(&sheet);
     }
+    arguments.outputs.refuse_other_kinds()?;
     let options = arguments.options(condition, jobs.len());
     let mut setup = cell_setup(&cell);
     let single = matches!(jobs.as_slice(), [job] if job.under.is_none() || job.paths.len() > 1);

@@ -13,7 +13,9 @@ use truegrind::arm::model::Model;
 use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::cell::{Cell, Used};
 use truegrind::compensation::deviation::{After, PathReport};
+use truegrind::compensation::options::Options;
 use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
+use truegrind::file_kind::FileKind;
 use truegrind::programs::motion::Listing;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::reading::{Language, Program};
@@ -22,7 +24,7 @@ use truegrind::report::status::Status;
 use truegrind::surfaces::SurfaceFile;
 use truegrind::units::done::Recorded;
 
-use super::cell_arguments::{CellArguments, note_unused_entries, refuse_contradictions};
+use super::cell_arguments::{CellArguments, check_length, note_unused_entries, refuse_contradictions};
 use super::computation::{Common, on_threads};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch, read_log};
@@ -86,9 +88,7 @@ struct Runner {
 
 /// Refuses numbers out of range, and options that only one program or one job can have.
 fn check_combinations(arguments: &Arguments, jobs: usize, several: bool) -> anyhow::Result<()> {
-    if !(arguments.tolerance > 0.0 && arguments.tolerance.is_finite()) {
-        bail!("--tolerance {}: expected a length above 0 in mm", arguments.tolerance);
-    }
+    check_length("--tolerance", arguments.tolerance, Options::MAX_TOLERANCE_MM)?;
     if several && !arguments.intended.is_empty() {
         bail!(
             "--intended is the original of one program, and these are {jobs}: name one program or task and its original, or a folder that is one \
@@ -167,6 +167,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let runners = runners(arguments)?;
     let first = runners.first().ok_or_else(|| anyhow!("--model names no arm"))?;
     let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;
+    arguments.outputs.refuse_other_kinds()?;
     let setup = cell_setup(&cell);
     let context = DeviationContext {
         runners: &runners,
@@ -347,6 +348,9 @@ impl DeviationContext<'_> {
         surface: Option<&SurfaceFile>,
     ) -> anyhow::Result<ProgramReports> {
         let task = programs.task(self.setup);
+        if task.listing().motions.is_empty() {
+            programs.refuse_other_kinds()?;
+        }
         let original = self.originals.map(|original| original.task(self.setup));
         for runner in self.runners {
             for program in original.iter().chain([&task]) {
@@ -519,7 +523,12 @@ fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {
     if let Some(path) = &arguments.actual {
         let text = files::read_text(path)?;
         let file: ArmFile = toml::from_str(&text).map_err(|e| {
-            anyhow!("{}: not an arm file of `simulate --arm`: {}", path.display(), e.to_string().trim_end())
+            let told = anyhow!(
+                "{}: not an arm file of `simulate --arm`: {}",
+                path.display(),
+                e.to_string().trim_end()
+            );
+            inputs::other_kind_or(path, &[FileKind::Arm], "an arm file of `simulate --arm`", told)
         })?;
         let model = file.model().map_err(|e| anyhow!("{}: {e}", path.display()))?;
         let first = models.first().ok_or_else(|| anyhow!("--model is missing"))?;

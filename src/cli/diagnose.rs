@@ -4,16 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use truegrind::ErrorSummary;
 use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind::calibration::diagnosis::transfer::new_rows;
-use truegrind::calibration::identification::calibration::Frames;
-use truegrind::calibration::identification::fit::summary_on;
-use truegrind::calibration::identification::identify::prepare_observations;
+use truegrind::calibration::diagnosis::measured::diagnose_rows;
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::measurement::dataset::Dataset;
-use truegrind::math::work::report_step;
 use truegrind::report::diagnosis as view;
 
 use super::computation::{Common, watching};
@@ -24,7 +19,7 @@ use super::output_extension;
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::shares::Shares;
-use super::stated_frames::{FramePriorArguments, Stated, StatedFrameArguments};
+use super::stated_frames::{FramePriorArguments, StatedFrameArguments};
 use super::terminal::print_message;
 
 /// Arguments of `diagnose`.
@@ -96,8 +91,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
             .1)
         })
         .collect::<anyhow::Result<Vec<Dataset>>>()?;
+    arguments.outputs.refuse_other_kinds()?;
     let found = watching(arguments.common.threads, &work, || {
-        diagnose_rows(arguments, &options, &name, &robot.model, &dataset, &others)
+        let placement = arguments.stated.prior(&arguments.prior)?;
+        let arm = (name.as_str(), &robot.model);
+        anyhow::Ok(diagnose_rows((&dataset, &others), arm, &placement, &options)?)
     })??;
     drop(work);
     for note in found.diagnosis.notes.iter().chain(&dataset.notes) {
@@ -121,6 +119,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Ok(if unexplained { ExitStatus::Flagged } else { ending })
 }
 
+/// Causes that one arm never has.
+const MAX_CAUSES: usize = 200;
+
 /// Options of the library.
 pub(super) fn options(arguments: &Arguments) -> anyhow::Result<Options> {
     if !(arguments.alpha > 0.0 && arguments.alpha <= 0.5) {
@@ -128,6 +129,12 @@ pub(super) fn options(arguments: &Arguments) -> anyhow::Result<Options> {
     }
     if arguments.blocks < 2 {
         bail!("--blocks {}: expected at least 2", arguments.blocks);
+    }
+    if !(1..=MAX_CAUSES).contains(&arguments.most) {
+        bail!(
+            "--most {}: expected 1 to {MAX_CAUSES} causes; `truegrind identify` fits geometry without any",
+            arguments.most
+        );
     }
     let mut options = Options {
         blocks: arguments.blocks,
@@ -141,46 +148,6 @@ pub(super) fn options(arguments: &Arguments) -> anyhow::Result<Options> {
     options.selection.most = arguments.most;
     options.selection.seed = arguments.common.seed;
     Ok(options)
-}
-
-/// Diagnoses one arm, and tests the models on its other measurements.
-pub(super) fn diagnose_rows(
-    arguments: &Arguments,
-    options: &Options,
-    name: &str,
-    nominal: &Model,
-    dataset: &Dataset,
-    others: &[Dataset],
-) -> anyhow::Result<Diagnosed> {
-    let frames = starting_frames(dataset, nominal, &options.tolerance, options.fuse_readout)?;
-    let stated = arguments.stated.frames(dataset)?;
-    let (tolerance, frames) = arguments.prior.prior(
-        [&options.tolerance, &options.arm_tolerance],
-        Stated { frames: stated.as_ref(), touched: arguments.stated.touched()? },
-        frames,
-        (dataset, nominal),
-    )?;
-    let options = Options { tolerance, ..options.clone() };
-    let mut found = diagnose(dataset, name, nominal, &frames, &options, &|step| report_step(step))?;
-    if let Some(stated) = &stated {
-        let raw = raw_error(dataset, nominal, stated, options.fuse_readout);
-        found.diagnosis.notes.push(format!(
-            "with the stated frames the nominal arm has an error of {:.3} mm RMS (raw error, nothing fitted)",
-            raw.rmse
-        ));
-    }
-    for other in others {
-        let Some(other) = new_rows(dataset, other, &mut found.diagnosis.notes) else { continue };
-        report_step(&format!("testing on {}", other.file));
-        let frames = starting_frames(&other, nominal, &options.tolerance, options.fuse_readout)?;
-        found.test_on(&other, &frames, &options.tolerance, options.fuse_readout);
-    }
-    Ok(found)
-}
-
-/// Error of the nominal arm with the stated sensor frames, nothing fitted.
-fn raw_error(dataset: &Dataset, nominal: &Model, stated: &Frames, fuse: bool) -> ErrorSummary {
-    summary_on(&prepare_observations(dataset, nominal, fuse).0, nominal, stated)
 }
 
 /// Diagnosis including the starting frames.

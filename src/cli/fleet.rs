@@ -8,6 +8,7 @@ use anyhow::{anyhow, bail};
 use serde_json::{Value, json};
 use truegrind::arm::estimated::Judgement;
 use truegrind::calibration::diagnosis::diagnose::Options;
+use truegrind::calibration::diagnosis::measured::diagnose_rows;
 use truegrind::report::diagnosis as page;
 use truegrind::report::fleet::{self as view, Row};
 use truegrind::report::format;
@@ -15,7 +16,7 @@ use truegrind::units::done::Recorded;
 use truegrind::units::key::sha256;
 
 use super::computation::{Common, on_threads};
-use super::diagnose::{Arguments, diagnose_rows, options};
+use super::diagnose::{Arguments, options};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch, read_log};
 use super::identify::{DataArguments, read_bytes, reason_not_written};
@@ -63,6 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     }
     let all: Vec<&Path> = jobs.iter().flat_map(|job| &job.paths).map(PathBuf::as_path).collect();
     Batch::check(&all, &arguments.outputs.files())?;
+    arguments.outputs.refuse_other_kinds()?;
     let options = options(arguments)?;
     if arguments.shares.on() {
         read_log::begin();
@@ -218,7 +220,9 @@ fn diagnose_arm(
     let (path, bytes) = read.first().ok_or_else(|| anyhow!("{}: names no file", job.name()))?;
     let data = DataArguments { data: path.clone(), ..arguments.data.clone() };
     let (robot, dataset) = read_bytes(&data, bytes)?;
-    let found = diagnose_rows(arguments, options, &robot.sheet.name, &robot.model, &dataset, &[])?;
+    let placement = arguments.stated.prior(&arguments.prior)?;
+    let arm = (robot.sheet.name.as_str(), &robot.model);
+    let found = diagnose_rows((&dataset, &[]), arm, &placement, options)?;
     let diagnosis = &found.diagnosis;
     let notes: Vec<String> = diagnosis.notes.iter().chain(&dataset.notes).cloned().collect();
     let reason = reason_not_written(&found.estimated, arguments.allow_doubtful);

@@ -47,6 +47,12 @@ enum UnitState<T> {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let outputs = Outputs::from(&arguments.pages);
+    if arguments.work.is_file() {
+        bail!(
+            "{}: is a file; expected the folder of a run (compensate, deviation or diagnose with --shard or --resume)",
+            arguments.work.display()
+        );
+    }
     let (store, run) = Store::open_existing(&arguments.work)?;
     if run.version != env!("CARGO_PKG_VERSION") {
         bail!(
@@ -64,6 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut targets = outputs.files();
     targets.extend(arguments.diff.as_deref());
     Batch::check(&inputs, &targets)?;
+    outputs.refuse_other_kinds()?;
     let context = GatherContext { arguments, store: &store, run: &run, jobs: &jobs };
     let batch = || Batch::sparing(inputs.iter());
     match run.verb.as_str() {

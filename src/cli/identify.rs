@@ -17,13 +17,15 @@ use truegrind::calibration::identification::verdict::Limits;
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import::{self, TimeMatching};
-use truegrind::calibration::measurement::matching::{Mismatch, prepare_rows};
-use truegrind::calibration::measurement::plausibility::implausible_payload;
+use truegrind::calibration::measurement::matching::Mismatch;
+use truegrind::calibration::measurement::rows_of_robot::rows_of_robot;
 use truegrind::calibration::measurement::split::{self, Split};
+use truegrind::file_kind::FileKind;
 use truegrind::report::format;
 use truegrind::report::{identification as view, study as study_view};
 use truegrind::robots::Robot;
 
+use super::cell_arguments::check_length;
 use super::computation::{Common, on_threads, watching};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
@@ -31,7 +33,7 @@ use super::inputs::{self, NamedRobot, UrdfLinks};
 use super::output_extension;
 use super::outputs::Outputs;
 use super::progress::Spinner;
-use super::stated_frames::{FramePriorArguments, Stated, StatedFrameArguments};
+use super::stated_frames::{FramePriorArguments, StatedFrameArguments};
 use super::terminal::{print_message, print_message_lines, print_result, width};
 
 /// Convention of the logged angles.
@@ -108,6 +110,9 @@ impl PointsArguments {
 /// Largest `--sensor-scale-sigma` (%): a sensor that is off by more measures nothing.
 const MAX_SCALE_PERCENT: f64 = 10.0;
 
+/// Largest error that a limit can mean (mm).
+const MAX_LIMIT_MM: f64 = 100.0;
+
 /// Largest `--points-within` (s).
 const MAX_POINTS_WITHIN_S: f64 = 3600.0;
 
@@ -164,9 +169,7 @@ impl FitArguments {
     /// The limits, checked.
     pub(super) fn limits(&self) -> anyhow::Result<Limits> {
         for (name, limit) in [("--limit-rmse", self.limit_rmse), ("--limit-max", self.limit_max)] {
-            if let Some(limit) = limit.filter(|limit| !(*limit > 0.0 && limit.is_finite())) {
-                bail!("{name} {limit}: expected a length above 0 in mm");
-            }
+            limit.map_or(Ok(()), |limit| check_length(name, limit, MAX_LIMIT_MM))?;
         }
         Ok(Limits { rmse_mm: self.limit_rmse, max_mm: self.limit_max })
     }
@@ -237,17 +240,20 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     if !(0.0..=0.9).contains(&arguments.held_out) || arguments.held_out == 0.0 {
         bail!("--held-out {}: expected a share above 0, up to 0.9", arguments.held_out);
     }
+    if arguments.compare_methods == Some(0) {
+        bail!("--compare-methods 0: expected 1 split or more");
+    }
     let limits = arguments.fit.limits()?;
     let (robot, dataset) = read(&arguments.data)?;
-    let options =
-        Options { stated_frames: arguments.stated.frames(&dataset)?, ..options(arguments, limits)? };
+    arguments.outputs.refuse_other_kinds()?;
+    let placement = arguments.stated.prior(&arguments.prior)?;
+    let options = Options { stated_frames: placement.frames(&dataset)?, ..options(arguments, limits)? };
     let work = Spinner::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
     let name = robot.sheet.name.clone();
     let found = watching(arguments.common.threads, &work, || {
         let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
-        let stated = Stated { frames: options.stated_frames.as_ref(), touched: arguments.stated.touched()? };
         let (tolerance, frames) =
-            arguments.prior.prior([&options.tolerance; 2], stated, frames, (&dataset, &robot.model))?;
+            placement.prior([&options.tolerance; 2], frames, (&dataset, &robot.model))?;
         let options = Options { tolerance, ..options.clone() };
         from_frames(&dataset, &name, &robot.model, &frames, &options)
     })??;
@@ -336,25 +342,14 @@ pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)
     let dataset = imported(arguments, &bytes)?;
     // Free the text before the rows are processed.
     drop(bytes);
-    let dataset = about_base(measured(arguments, &robot, dataset)?, &robot);
+    let dataset = measured(arguments, &robot, dataset)?;
     Ok((robot, dataset))
-}
-
-/// With a note on the base that frames and programs are read in, where it is not that of the robot file.
-fn about_base(mut dataset: Dataset, robot: &Robot) -> Dataset {
-    dataset.notes.extend(robot.base_note.iter().map(|note| {
-        format!(
-            "{note}. Sensor frames and the positions of programs count from that base, where controllers have it: compare a position that the \
-             controller shows with `truegrind robots --check`"
-        )
-    }));
-    dataset
 }
 
 /// [`read`] for measurements that are already in memory.
 pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<(Robot, Dataset)> {
     let robot = inputs::robot(arguments.named())?;
-    let dataset = about_base(measured(arguments, &robot, imported(arguments, bytes)?)?, &robot);
+    let dataset = measured(arguments, &robot, imported(arguments, bytes)?)?;
     Ok((robot, dataset))
 }
 
@@ -362,12 +357,11 @@ fn imported(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<Dataset> 
     let options =
         import::Options { sheet: arguments.sheet.clone(), allow_odd_units: arguments.allow_odd_units };
     let name = files::name(&arguments.data);
-    // A table may have any name, so only one that cannot be read is a program.
-    let program = || inputs::refuse_program(&arguments.data, "measurements (.csv or .xlsx)").err();
+    // A table may have any name, so only one that cannot be read is a file of another kind.
+    let own = [FileKind::Measurements, FileKind::Empty];
     Ok(match (&arguments.points.points, arguments.points.clocks()?) {
-        (None, _) => {
-            import::read(&name, bytes, &options).map_err(|e| program().unwrap_or_else(|| e.into()))?
-        }
+        (None, _) => import::read(&name, bytes, &options)
+            .map_err(|e| inputs::other_kind_or(&arguments.data, &own, "measurements (.csv or .xlsx)", e))?,
         (Some(points), clocks) => {
             let (export, exported) = (files::name(points), files::read(points)?);
             match clocks {
@@ -381,59 +375,17 @@ fn imported(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<Dataset> 
 }
 
 fn measured(arguments: &DataArguments, robot: &Robot, dataset: Dataset) -> anyhow::Result<Dataset> {
-    let convention = arguments.angles.map_or_else(|| robot.sheet.joints.angles.into(), AngleConvention::from);
-    let (name, odd) = (&robot.sheet.name, arguments.allow_odd_units);
-    if !odd {
-        refuse_implausible_payload(&dataset, robot)?;
-    }
-    let mut dataset =
-        prepare_rows(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
-            Mismatch::Units(_) | Mismatch::Condition(_) => {
-                anyhow!("{mismatch} (--allow-odd-units accepts the file anyway)")
-            }
-            _ => anyhow!("{mismatch}"),
-        })?;
-    note_payloads(&mut dataset, robot);
-    Ok(dataset)
+    let convention = arguments.angles.map(AngleConvention::from);
+    rows_of_robot(dataset, robot, convention, arguments.allow_odd_units).map_err(of_file)
 }
 
-/// Notes payloads that are not used, and those above the rated one: perhaps they are in pounds or newtons.
-fn note_payloads(dataset: &mut Dataset, robot: &Robot) {
-    let loads_kg = || dataset.rows.iter().filter_map(|row| row.condition.payload_kg);
-    let most_kg = loads_kg().reduce(f64::max);
-    if robot.model.bodies.is_none() && most_kg != loads_kg().reduce(f64::min) {
-        dataset.notes.push(format!(
-            "column payload: no masses are known for {}, and without them a deflection cannot follow the load, so the loads are not used; measure \
-             each load in a file of its own, or state the masses in a robot file",
-            robot.sheet.name
-        ));
-    }
-    let is_at_flange = dataset.rows.iter().all(|row| row.condition.payload_centre_mm == [0.0; 3]);
-    if robot.model.bodies.is_some() && is_at_flange && most_kg.is_some_and(|kg| kg > 0.0) {
-        dataset.notes.push(
-            "column payload: its centre of mass is taken to be at the flange; where it is not, state it in the columns payload_x, payload_y and \
-             payload_z (mm, in the flange frame), or the compliance of the wrist is found too large"
-                .to_owned(),
-        );
-    }
-    if let (Some(kg), Some(rated)) = (most_kg, robot.sheet.payload_kg)
-        && kg > OVERLOAD * rated
-    {
-        dataset.notes.push(format!(
-            "column payload: up to {kg} kg, and {} is rated for {rated} kg; check that it is in kg",
-            robot.sheet.name
-        ));
-    }
-}
-
-/// Payload over the rated one that is noted.
-const OVERLOAD: f64 = 1.2;
-
-/// Refuses a payload that is far above the rated one, where that is known.
-pub(super) fn refuse_implausible_payload(dataset: &Dataset, robot: &Robot) -> anyhow::Result<()> {
-    match robot.sheet.payload_kg.and_then(|rated| implausible_payload(dataset, rated)) {
-        Some(suspicion) => bail!("{suspicion} (--allow-odd-units accepts the file anyway)"),
-        None => Ok(()),
+/// A mismatch of a measurement file, with the option that accepts it where there is one.
+pub(super) fn of_file(mismatch: Mismatch) -> anyhow::Error {
+    match mismatch {
+        Mismatch::Units(_) | Mismatch::Condition(_) | Mismatch::Payload(_) => {
+            anyhow!("{mismatch} (--allow-odd-units accepts the file anyway)")
+        }
+        _ => anyhow!("{mismatch}"),
     }
 }
 

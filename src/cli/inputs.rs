@@ -6,7 +6,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
-use truegrind::programs::reading::Language;
+use truegrind::file_kind::FileKind;
 use truegrind::robots::foreign::{ImportOptions, ImportedRobot, Kind, import};
 use truegrind::robots::{self, Robot};
 
@@ -66,7 +66,8 @@ impl NamedRobot<'_> {
     pub(super) fn import(&self) -> anyhow::Result<ImportedRobot> {
         let UrdfLinks { base, tip } = self.links.clone();
         let choice = ImportOptions { base, tip, ..ImportOptions::default() };
-        Ok(import(&files::read_text(Path::new(self.name))?, self.name, &choice)?)
+        let path = Path::new(self.name);
+        import(&files::read_text(path)?, self.name, &choice).map_err(|e| other_than_robot_or(path, e))
     }
 }
 
@@ -99,6 +100,9 @@ pub(super) enum NamedModel {
     },
 }
 
+/// What `--model` reads.
+const MODEL_FILE: &str = "a model file as written by `truegrind identify -o`";
+
 /// Reads `nominal` or a model file.
 pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     if argument.eq_ignore_ascii_case("nominal") {
@@ -107,18 +111,8 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     let path = Path::new(argument);
     let text = files::read_text(path)?;
     let arm = Estimated::from_toml(&text).map_err(|e| {
-        if let Err(program) = refuse_program(path, "a model file as written by `truegrind identify -o`") {
-            return program;
-        }
-        if let Some(other) = other_kind(&text) {
-            return anyhow!(
-                "{argument}: {other}; expected a model file as written by `truegrind identify -o`"
-            );
-        }
-        anyhow!(
-            "{argument}: {}; expected a model file as written by `truegrind identify -o`",
-            e.to_string().trim_end()
-        )
+        let told = anyhow!("{argument}: {}; expected {MODEL_FILE}", e.to_string().trim_end());
+        other_kind_or(path, &[FileKind::Model], MODEL_FILE, told)
     })?;
     robots::check_catalogue_name(&arm.robot, &arm.nominal).map_err(|e| anyhow!("{argument}: {e}"))?;
     if arm.verdict.status == Judgement::Fail {
@@ -131,30 +125,26 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     Ok(NamedModel::Estimated { name: files::name(path), hash, arm: Box::new(arm) })
 }
 
-/// What a file is that is no model, where another option reads it.
-fn other_kind(text: &str) -> Option<&'static str> {
-    let keys = toml::from_str::<toml::Table>(text).ok()?;
-    let has = |key: &str| keys.contains_key(key);
-    if has("schema") {
-        None
-    } else if has("joint_map") && has("link") {
-        Some("this is a simulated arm, which --actual reads")
-    } else if has("tool") || has("wobj") {
-        Some("this is a cell file, which --cell reads")
-    } else {
-        None
+/// What a file that cannot be read as `expected` is, where its name or its content shows another kind than `own`; otherwise `error`, with which
+/// its parser complained about the first line.
+pub(super) fn other_kind_or(
+    path: &Path,
+    own: &[FileKind],
+    expected: &str,
+    error: impl Into<anyhow::Error>,
+) -> anyhow::Error {
+    let bytes = files::read(path).unwrap_or_default();
+    match FileKind::of(&files::name(path), &bytes).filter(|kind| !own.contains(kind)) {
+        Some(kind) => anyhow!("{}: {}; expected {expected}", path.display(), kind.text()),
+        None => error.into(),
     }
 }
 
-/// Refuses a program, by its name, where a file of another kind is read: the parser of that would complain about its first line.
-pub(super) fn refuse_program(path: &Path, expected: &str) -> anyhow::Result<()> {
-    match Language::by_name(&files::name(path)) {
-        Some(Language::Rapid) => {
-            bail!("{}: this is a RAPID program; expected {expected}", path.display())
-        }
-        Some(Language::Nc) => bail!("{}: this is an NC program; expected {expected}", path.display()),
-        None => Ok(()),
-    }
+/// [`other_kind_or`] where a robot file is read.
+pub(super) fn other_than_robot_or(path: &Path, error: impl Into<anyhow::Error>) -> anyhow::Error {
+    let expected =
+        "a robot file: TOML, URDF, a table of link parameters (.csv), or a UR calibration (.conf, .yaml)";
+    other_kind_or(path, &[FileKind::Robot], expected, error)
 }
 
 /// Refuses a doubtful model unless allowed, in which case a note is printed.

@@ -51,6 +51,23 @@ pub(super) fn csv_file(name: &str) -> Result<PathBuf, String> {
     Ok(path)
 }
 
+/// Extensions by which a spreadsheet, a browser or this program itself takes a file for another kind.
+const TELLING: [&str; 12] =
+    ["csv", "tsv", "xlsx", "xls", "xlsb", "ods", "parquet", "json", "html", "htm", "md", "toml"];
+
+/// Refuses a report whose extension promises another kind of file.
+pub(super) fn refuse_other_kind(output: &Path, kind: &str, own: &[&str]) -> anyhow::Result<()> {
+    let extension = output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    match extension.filter(|found| TELLING.contains(&found.as_str()) && !own.contains(&found.as_str())) {
+        Some(other) => bail!(
+            "{}: {kind} is written here: expected the extension .{}, not .{other}",
+            output.display(),
+            own.first().unwrap_or(&"")
+        ),
+        None => Ok(()),
+    }
+}
+
 /// Refuses an output with the extension of an NC program.
 pub(super) fn refuse_nc(output: &Path) -> anyhow::Result<()> {
     match language_of(output)? {

@@ -8,7 +8,7 @@ use truegrind::report::format;
 use truegrind::report::table::Table;
 
 use super::files::{Batch, is_stdout};
-use super::output_extension::csv_file;
+use super::output_extension::{csv_file, refuse_other_kind};
 use super::terminal::{print_message_lines, print_result, width};
 
 /// Tables and pages. An option without a file name writes to stdout.
@@ -64,6 +64,23 @@ impl Outputs {
     pub(super) fn files(&self) -> Vec<&Path> {
         let Pages { json, csv, parquet, md, html } = &self.pages;
         [json, csv, parquet, md, html, &self.rrd].into_iter().filter_map(|p| p.as_deref()).collect()
+    }
+
+    /// Refuses a file whose extension promises another kind of file than it gets. An output that is an input is the graver fault, so that this
+    /// comes once all inputs are read.
+    pub(super) fn refuse_other_kinds(&self) -> anyhow::Result<()> {
+        let Pages { json, csv, parquet, md, html } = &self.pages;
+        let all: [(_, _, &[&str]); 5] = [
+            (json, "JSON", &["json"]),
+            (csv, "CSV", &["csv", "tsv"]),
+            (parquet, "Parquet", &["parquet"]),
+            (md, "Markdown", &["md"]),
+            (html, "an HTML page", &["html", "htm"]),
+        ];
+        for (path, kind, own) in all {
+            path.as_deref().map_or(Ok(()), |path| refuse_other_kind(path, kind, own))?;
+        }
+        Ok(())
     }
 
     /// Whether any output shows the points of a path.

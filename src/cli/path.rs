@@ -2,13 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{anyhow, bail};
+use anyhow::anyhow;
 use clap::Args;
-use truegrind::planning::toolpath::{Toolpath, toolpath};
-use truegrind::programs::nc;
-use truegrind::programs::nc::dialect::Dialect;
-use truegrind::programs::nc::orientation::Angles;
-use truegrind::programs::rapid::writer;
+use truegrind::file_kind::FileKind;
+use truegrind::planning::toolpath::{Toolpath, control_of, toolpath};
 use truegrind::robots::Robot;
 use truegrind::surfaces::SurfaceFile;
 
@@ -17,7 +14,6 @@ use super::files::{self, Batch};
 use super::inputs::{self, UrdfLinks};
 use super::robot_match;
 use super::terminal::print_message;
-use truegrind::compensation::cell::nc_setup::angle_convention;
 
 /// Arguments of `path`.
 #[derive(Debug, Args)]
@@ -45,12 +41,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     files::expect(&arguments.surface)?;
     Batch::check(&[], &[&arguments.output])?;
     let control = control_of(&arguments.output)?;
-    let mut path = toolpath(&file, &robot.model, &robot.sheet.name)?;
-    path.draft.named_targets = !arguments.inline;
-    let bytes = match control {
-        Some(control) => nc::writer::write(&path.draft, control, angles_of(&robot))?,
-        None => writer::write(&path.draft)?,
-    };
+    let path = toolpath(&file, &robot.model, &robot.sheet.name)?;
+    let bytes = path.program(control, &robot, arguments.inline)?;
     let mut batch = Batch::sparing([&arguments.surface]);
     batch.add(&arguments.output, bytes);
     batch.write()?;
@@ -59,25 +51,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         robot_match::note_other_language(&robot);
     }
     Ok(ExitStatus::Done)
-}
-
-/// The control for which an output is written; `None` for RAPID, which stdout gets too.
-fn control_of(output: &Path) -> anyhow::Result<Option<Dialect>> {
-    let extension = output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-    match extension.as_deref() {
-        Some("nc") => Ok(Some(Dialect::Fanuc)),
-        Some("mpf" | "spf") => Ok(Some(Dialect::Siemens)),
-        Some("mod" | "modx" | "prg" | "sys") | None => Ok(None),
-        Some(other) => bail!(
-            "{}: new programs are written as RAPID (.mod), Fanuc style (.nc) or 840D (.mpf), not as .{other}: choose one of these extensions",
-            output.display()
-        ),
-    }
-}
-
-/// Meaning of A, B and C: that of the robot file, or else rotations about the fixed x, y and z axes (W, P, R).
-fn angles_of(robot: &Robot) -> Angles {
-    robot.sheet.orientation().and_then(angle_convention).unwrap_or(Angles::Wpr)
 }
 
 fn report_toolpath(path: &Toolpath, robot: &Robot, output: &Path) {
@@ -91,12 +64,16 @@ fn report_toolpath(path: &Toolpath, robot: &Robot, output: &Path) {
     ));
 }
 
+/// What `path` and `--surface` read.
+const SURFACE_FILE: &str = "a surface file, such as surfaces/blade.toml";
+
 /// Reads a surface file and the mesh that it names.
 pub(super) fn surface(path: &Path) -> anyhow::Result<SurfaceFile> {
     let bytes = files::read(path)?;
     let name = path.display().to_string();
-    inputs::refuse_program(path, "a surface file (.toml)")?;
     let resolve = |mesh: &str| inputs::read_beside(path, mesh).map_err(|e| format!("{e:#}"));
-    SurfaceFile::read(&name, &bytes, resolve)
-        .map_err(|e| anyhow!("{e}; expected a surface file, such as surfaces/blade.toml"))
+    SurfaceFile::read(&name, &bytes, resolve).map_err(|e| {
+        let told = anyhow!("{e}; expected {SURFACE_FILE}");
+        inputs::other_kind_or(path, &[FileKind::Surface], SURFACE_FILE, told)
+    })
 }

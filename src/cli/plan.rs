@@ -4,17 +4,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
-use serde_json::Value;
 use truegrind::calibration::measurement::dataset::Sensor;
+use truegrind::file_kind::FileKind;
 use truegrind::planning::poses::candidate::{Bounds, MARGIN_DEG};
 use truegrind::planning::poses::design::Index;
-use truegrind::planning::poses::keep_out::KeepOut;
-use truegrind::planning::poses::program::{ProgramSettings, draft};
-use truegrind::planning::poses::rows::Noise;
+use truegrind::planning::poses::program::draft;
 use truegrind::planning::poses::schedule::{APPROACH_DEG, Visits};
-use truegrind::planning::poses::{
-    FIELD_POSES, MeasurementSetup, Options, READING_DEG, plan, questions, reach_mm,
-};
+use truegrind::planning::poses::settings::Settings;
+use truegrind::planning::poses::{MeasurementSetup, Options, READING_DEG, plan, questions};
 use truegrind::programs::rapid::writer;
 use truegrind::report::planning as view;
 
@@ -145,10 +142,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Batch::check(&inputs_of, &targets)?;
     arguments.output.as_deref().map_or(Ok(()), output_extension::refuse_nc)?;
     let sensor = Sensor::from(arguments.sensor);
-    let frames = arguments.stated.planned(sensor)?;
+    let frames = arguments.stated.placement()?.planned(sensor)?;
     let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
-    let options =
-        Options { rated_load_kg: robot.sheet.payload_kg, ..options(arguments, &robot.sheet.name, &setup)? };
+    let settings = settings(arguments, &robot.sheet.name)?;
+    arguments.outputs.refuse_other_kinds()?;
+    let options = settings.options(&robot, &setup, arguments.stated.states_sensor_frame())?;
     let work = Spinner::start(format!("choosing among {} poses", arguments.candidates));
     let planned = on_threads(arguments.common.threads, || plan(&setup, &options))?
         .map_err(|e| anyhow!("{}: {e}", robot.sheet.name))?;
@@ -168,14 +166,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
             .add(path, super::recording::plan(&planned, &setup, name, arguments.links.of(&arguments.robot))?);
     }
     if let Some(path) = &arguments.output {
-        let drive = ProgramSettings {
-            robot: name.to_owned(),
-            travel_mm_s: arguments.speed,
-            // Visits of one pose over a long time are waited for.
-            settle_s: arguments.settle
-                + (options.visits.seconds_per_row - arguments.seconds_per_row).max(0.0),
-            ..ProgramSettings::default()
-        };
+        let drive = settings.program(&robot, &options);
         batch.add(path, writer::write(&draft(&planned, &setup, &drive))?);
         robot_match::note_other_language(&robot);
     }
@@ -184,89 +175,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Ok(if rough { ExitStatus::Flagged } else { ExitStatus::Done })
 }
 
-/// Largest number of poses.
-const MAX_POSES: usize = 2000;
-
-/// Largest number of candidates; more do not improve the design.
-const MAX_CANDIDATES: usize = 100_000;
-
-/// Noisier sensors identify no arm; micrometres are meant (mm).
-const MAX_SIGMA_MM: f64 = 10.0;
-
-/// The space that the arm must keep out of.
-fn space(arguments: &Arguments, usual: KeepOut, reach_mm: f64) -> anyhow::Result<KeepOut> {
-    let mut boxes_mm = Vec::new();
-    for text in &arguments.keep_out {
-        match numbers("--keep-out", text)?[..] {
-            [a, b, c, d, e, f] if a != d && b != e && c != f => {
-                boxes_mm.push([[a.min(d), b.min(e), c.min(f)], [a.max(d), b.max(e), c.max(f)]]);
-            }
-            _ => bail!("--keep-out {text}: expected two corners of a box, x,y,z,x,y,z (mm)"),
-        }
-    }
-    if !arguments.floor.is_finite() {
-        bail!("--floor {}: expected a height in mm", arguments.floor);
-    }
-    let radius_mm = arguments.link_radius.unwrap_or(usual.radius_mm);
-    if !(0.0..=reach_mm).contains(&radius_mm) {
-        bail!("--link-radius {radius_mm}: expected 0 up to the reach of {reach_mm:.0} mm");
-    }
-    let approach_rad = arguments.approach.to_radians();
-    Ok(KeepOut { floor_mm: Some(arguments.floor), boxes_mm, radius_mm, approach_rad })
-}
-
-/// Refuses numbers and counts out of range.
-fn check_numbers(arguments: &Arguments, sigma: f64, usual_poses: usize) -> anyhow::Result<()> {
-    for (name, value) in [
-        ("--sigma", sigma),
-        ("--sigma-angle", arguments.sigma_angle),
-        ("--approach", arguments.approach),
-        ("--seconds-per-row", arguments.seconds_per_row),
-        ("--speed", arguments.speed),
-        ("--decisive", arguments.decisive),
-    ] {
-        if !(value > 0.0 && value.is_finite()) {
-            bail!("{name} {value}: expected a number above 0");
-        }
-    }
-    if sigma > MAX_SIGMA_MM {
-        bail!("--sigma {sigma}: expected mm, up to {MAX_SIGMA_MM} (30 µm are 0.03)");
-    }
-    for (name, value) in [
-        ("--settle", arguments.settle),
-        ("--margin", arguments.margin),
-        ("--singularity", arguments.singularity),
-    ] {
-        if !(value >= 0.0 && value.is_finite()) {
-            bail!("{name} {value}: expected 0 or more");
-        }
-    }
-    let poses = arguments.poses.unwrap_or(usual_poses);
-    if poses < 4 {
-        bail!("--poses {poses}: expected at least 4; about 50 to 100 are usual");
-    }
-    if poses > MAX_POSES {
-        bail!("--poses {poses}: expected at most {MAX_POSES}; about 50 to 100 are usual");
-    }
-    for (name, count) in [
-        ("--repeats", arguments.repeats),
-        ("--both-sides", arguments.both_sides),
-        ("--warm-up", arguments.warm_up),
-    ] {
-        if count > MAX_POSES {
-            bail!("{name} {count}: expected at most {MAX_POSES}");
-        }
-    }
-    if arguments.candidates > MAX_CANDIDATES {
-        bail!("--candidates {}: expected at most {MAX_CANDIDATES}; 2000 are usual", arguments.candidates);
-    }
-    Ok(())
-}
-
 /// Refuses the diagnosis of another robot. That of another sensor may be decided by this one.
 fn refuse_other_diagnosis(path: &Path, text: &str, robot: &str) -> anyhow::Result<()> {
-    let diagnosis: Value = serde_json::from_str(text)?;
-    match diagnosis["dataset"]["robot"].as_str() {
+    match questions::robot_of(text) {
         Some(found) if found != robot => {
             bail!(
                 "{}: the diagnosis is of robot {found}, but the plan is for {robot}: state --robot {found}",
@@ -283,8 +194,11 @@ fn left_open(arguments: &Arguments, robot: &str) -> anyhow::Result<questions::Op
         None => questions::Open::default(),
         Some(path) => {
             let text = files::read_text(path)?;
-            let found =
-                questions::open(&text, arguments.finding).map_err(|e| anyhow!("{}: {e}", path.display()))?;
+            let found = questions::open(&text, arguments.finding).map_err(|e| {
+                let told = anyhow!("{}: {e}", path.display());
+                let own = [FileKind::Diagnosis, FileKind::Report];
+                inputs::other_kind_or(path, &own, "a diagnosis, as written by `diagnose --json`", told)
+            })?;
             refuse_other_diagnosis(path, &text, robot)?;
             if found == questions::Open::default() {
                 print_message(format_args!(
@@ -297,74 +211,50 @@ fn left_open(arguments: &Arguments, robot: &str) -> anyhow::Result<questions::Op
     })
 }
 
-fn options(arguments: &Arguments, robot: &str, setup: &MeasurementSetup<'_>) -> anyhow::Result<Options> {
-    let sight_is_known = arguments.stated.states_sensor_frame();
-    let usual = Options::usual(setup.nominal, setup.sensor, sight_is_known);
-    let sigma = arguments.sigma.unwrap_or(usual.noise.reading_mm);
-    check_numbers(arguments, sigma, usual.poses)?;
-    let box_mm = match &arguments.box_mm {
-        None => None,
-        Some(text) => match numbers("--box", text)?[..] {
-            [a, b, c, d, e, f] if a < d && b < e && c < f => Some([[a, b, c], [d, e, f]]),
-            _ => bail!("--box {text}: expected x,y,z of the lower and x,y,z of the upper corner (mm)"),
-        },
+/// Two corners of a box.
+fn corners(option: &str, text: &str) -> anyhow::Result<[[f64; 3]; 2]> {
+    match numbers(option, text)?[..] {
+        [a, b, c, d, e, f] => Ok([[a, b, c], [d, e, f]]),
+        _ => bail!("{option} {text}: expected two corners of a box, x,y,z,x,y,z (mm)"),
+    }
+}
+
+fn settings(arguments: &Arguments, robot: &str) -> anyhow::Result<Settings> {
+    let distance_mm = |text: &str| match numbers("--range", text)?[..] {
+        [low, high] => Ok([low, high]),
+        _ => bail!("--range {text}: expected the shortest and the longest distance, min,max (mm)"),
     };
-    let distance_mm = match &arguments.range {
-        None => None,
-        Some(text) => match numbers("--range", text)?[..] {
-            [low, high] if 0.0 <= low && low < high => Some([low, high]),
-            _ => bail!("--range {text}: expected the shortest and the longest distance, min,max (mm)"),
-        },
-    };
-    let clearance_mm = match arguments.clearance {
-        None => usual.bounds.clearance_mm,
-        Some(_) if usual.bounds.clearance_mm.is_none() => {
-            bail!("--clearance: the line of sight is known with --sensor-frame alone: state it too")
-        }
-        Some(0.0) => None,
-        Some(mm) if mm > 0.0 && mm.is_finite() => Some(mm),
-        Some(mm) => bail!("--clearance {mm}: expected 0 or more (mm)"),
-    };
-    let space = space(arguments, usual.bounds.space, reach_mm(setup.nominal))?;
-    let questions::Open { questions, something_else, joint_scatters } = left_open(arguments, robot)?;
-    let approach_rad = arguments.approach.to_radians();
-    let poses = arguments.poses.unwrap_or(if joint_scatters { FIELD_POSES } else { usual.poses });
-    // Whether it differs by the side or from time to time is asked at every pose.
-    let [repeats, both_sides, warm_up] = match joint_scatters {
-        true => [poses, poses, 0],
-        false => [arguments.repeats, arguments.both_sides, arguments.warm_up],
-    };
-    let options = Options {
-        poses,
+    Ok(Settings {
+        poses: arguments.poses,
         index: match arguments.index {
             IndexArgument::D => Index::D,
             IndexArgument::O1 => Index::O1,
         },
-        noise: Noise { reading_mm: sigma, reading_rad: arguments.sigma_angle.to_radians() },
-        candidates: arguments.candidates.max(poses + FIELD_POSES),
-        bounds: Bounds {
-            margin_rad: arguments.margin.to_radians().max(approach_rad),
-            min_singularity: arguments.singularity,
-            box_mm,
-            distance_mm,
-            clearance_mm,
-            space,
-        },
-        visits: Visits {
-            repeats,
-            both_sides,
-            warm_up,
-            approach_rad,
-            seconds_per_row: arguments.seconds_per_row,
-        },
-        questions,
-        something_else: something_else.clone(),
+        sigma_mm: arguments.sigma,
+        sigma_angle_deg: arguments.sigma_angle,
+        box_mm: arguments.box_mm.as_deref().map(|text| corners("--box", text)).transpose()?,
+        distance_mm: arguments.range.as_deref().map(distance_mm).transpose()?,
+        clearance_mm: arguments.clearance,
+        keep_out_mm: arguments
+            .keep_out
+            .iter()
+            .map(|text| corners("--keep-out", text))
+            .collect::<anyhow::Result<_>>()?,
+        floor_mm: arguments.floor,
+        link_radius_mm: arguments.link_radius,
+        margin_deg: arguments.margin,
+        singularity: arguments.singularity,
+        repeats: arguments.repeats,
+        both_sides: arguments.both_sides,
+        warm_up: arguments.warm_up,
+        approach_deg: arguments.approach,
+        settle_s: arguments.settle,
+        seconds_per_row: arguments.seconds_per_row,
+        speed_mm_s: arguments.speed,
         decisive: arguments.decisive,
+        candidates: arguments.candidates,
         seed: arguments.common.seed,
-        ..Options::default()
-    };
-    Ok(match something_else.filter(|_| arguments.finding.is_some()) {
-        Some(alone) => options.for_something_else(alone, arguments.poses.unwrap_or(FIELD_POSES)),
-        None => options,
+        open: left_open(arguments, robot)?,
+        one_finding: arguments.finding.is_some(),
     })
 }

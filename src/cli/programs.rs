@@ -6,6 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use rayon::prelude::*;
+use truegrind::file_kind::FileKind;
 use truegrind::programs::nc::called::called_programs;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::rapid::task_list;
@@ -399,6 +400,23 @@ impl Programs {
         let sources: Vec<(&str, &[u8])> =
             names.iter().zip(&self.files).map(|(n, (_, b))| (n.as_str(), b.as_slice())).collect();
         Program::read(&sources, setup)
+    }
+
+    /// Refuses files of another kind, for programs in which no motion was found.
+    pub(super) fn refuse_other_kinds(&self) -> anyhow::Result<()> {
+        for (path, bytes) in &self.files {
+            let name = files::name(path);
+            if Language::by_name(&name).is_none()
+                && let Some(kind) = FileKind::of(&name, bytes)
+            {
+                bail!(
+                    "{}: {}; expected a program: RAPID (.mod, .prg, .sys, .pgf) or NC code (.nc, .mpf, .h and others)",
+                    path.display(),
+                    kind.text()
+                );
+            }
+        }
+        Ok(())
     }
 
     /// The file names, for reports.

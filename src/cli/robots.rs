@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::Args;
+use serde_json::Value;
 use truegrind::report::format;
 use truegrind::report::robots as view;
 use truegrind::robots;
@@ -12,6 +13,7 @@ use truegrind::robots::foreign::{ImportOptions, import};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch, is_stdout};
 use super::inputs;
+use super::output_extension::refuse_other_kind;
 use super::terminal::{print_message_lines, print_result, width};
 
 /// Arguments of `robots`.
@@ -35,6 +37,9 @@ pub(super) struct Arguments {
     /// Write the arm as a truegrind robot file, for instance to state that it hangs (gravity under [robot.mounting]).
     #[arg(short, long, value_name = "ARM.toml")]
     output: Option<PathBuf>,
+    /// Write the catalogue, or one robot with all numbers of its data sheet, as JSON.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    json: Option<PathBuf>,
     /// Write a self-contained HTML page with a picture of the zero pose.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     html: Option<PathBuf>,
@@ -52,31 +57,50 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     {
         bail!("--html, --base, --tip and --ground-joint-3 are for a robot file: give it with --check FILE");
     }
-    match &arguments.name {
-        Some(name) => {
-            let robot = inputs::robot(name.as_str())?;
-            let text = format::terminal::document(&view::document(&robot), width());
-            let Some(output) = &arguments.output else {
-                print_result(text)?;
-                return Ok(ExitStatus::Done);
-            };
-            expect_robot_file(output)?;
-            let inputs: &[&Path] =
-                if robots::catalogue().iter().any(|known| known == name) { &[] } else { &[Path::new(name)] };
-            Batch::check(inputs, &[output])?;
-            let mut batch = Batch::sparing(inputs.iter().copied());
-            batch.add(output, robots::to_toml(&robot).map_err(|error| anyhow!("{name}: {error}"))?);
-            batch.write()?;
-            if is_stdout(output) { print_message_lines(&text) } else { print_result(text)? }
-        }
-        None if arguments.output.is_some() => {
+    let Some(name) = &arguments.name else {
+        if arguments.output.is_some() {
             bail!("which arm shall be written? Give its name, or a robot file with --check FILE")
         }
-        None => {
-            let all = robots::catalogue();
-            let sheets = all.iter().map(|name| robots::load(name)).collect::<Result<Vec<_>, _>>()?;
-            print_result(format::terminal::table(&view::catalogue_table(&sheets), width()))?;
-        }
+        let all = robots::catalogue();
+        let sheets = all.iter().map(|name| robots::load(name)).collect::<Result<Vec<_>, _>>()?;
+        let text = format::terminal::table(&view::catalogue_table(&sheets), width());
+        return write(arguments, &[], &text, &view::catalogue_json(&sheets), Vec::new());
+    };
+    let robot = inputs::robot(name.as_str())?;
+    let inputs: &[&Path] =
+        if robots::catalogue().iter().any(|known| known == name) { &[] } else { &[Path::new(name)] };
+    let mut made = Vec::new();
+    if let Some(output) = &arguments.output {
+        expect_robot_file(output)?;
+        made.push((output.as_path(), robots::to_toml(&robot).map_err(|error| anyhow!("{name}: {error}"))?));
+    }
+    let text = format::terminal::document(&view::document(&robot), width());
+    write(arguments, inputs, &text, &view::json(&robot), made)
+}
+
+/// Writes what was made, and the JSON if it was asked for, and prints the text: to stderr if stdout is taken.
+fn write<'a>(
+    arguments: &'a Arguments,
+    inputs: &[&Path],
+    text: &str,
+    json: &Value,
+    mut made: Vec<(&'a Path, String)>,
+) -> anyhow::Result<ExitStatus> {
+    if let Some(path) = &arguments.json {
+        made.push((path, format::json::text(json)?));
+    }
+    let outputs: Vec<&Path> = made.iter().map(|(path, _)| *path).collect();
+    Batch::check(inputs, &outputs)?;
+    arguments.json.as_deref().map_or(Ok(()), |path| refuse_other_kind(path, "JSON", &["json"]))?;
+    let mut batch = Batch::sparing(inputs.iter().copied());
+    for (path, text) in made {
+        batch.add(path, text);
+    }
+    batch.write()?;
+    if outputs.into_iter().any(is_stdout) {
+        print_message_lines(text)
+    } else {
+        print_result(text)?
     }
     Ok(ExitStatus::Done)
 }
@@ -91,9 +115,16 @@ fn expect_robot_file(output: &Path) -> anyhow::Result<()> {
 
 /// Shows how a robot file is interpreted.
 fn check(arguments: &Arguments, path: &Path) -> anyhow::Result<ExitStatus> {
-    let outputs: Vec<&Path> =
-        [&arguments.output, &arguments.html].into_iter().filter_map(|p| p.as_deref()).collect();
+    let outputs: Vec<&Path> = [&arguments.output, &arguments.html, &arguments.json]
+        .into_iter()
+        .filter_map(|path| path.as_deref())
+        .collect();
     Batch::check(&[path], &outputs)?;
+    arguments.json.as_deref().map_or(Ok(()), |path| refuse_other_kind(path, "JSON", &["json"]))?;
+    arguments
+        .html
+        .as_deref()
+        .map_or(Ok(()), |path| refuse_other_kind(path, "an HTML page", &["html", "htm"]))?;
     if let Some(output) = &arguments.output {
         expect_robot_file(output)?;
     }
@@ -103,21 +134,16 @@ fn check(arguments: &Arguments, path: &Path) -> anyhow::Result<ExitStatus> {
         ground_joint_3: arguments.ground_joint_3,
     };
     let name = path.display().to_string();
-    let found = import(&files::read_text(path)?, &name, &choice)?;
-    let mut batch = Batch::sparing([path]);
+    let found =
+        import(&files::read_text(path)?, &name, &choice).map_err(|e| inputs::other_than_robot_or(path, e))?;
+    let mut made = Vec::new();
     if let Some(output) = &arguments.output {
         let toml = robots::to_toml(&found.robot).map_err(|error| anyhow!("{name}: {error}"))?;
-        batch.add(output, toml);
+        made.push((output.as_path(), toml));
     }
     if let Some(html) = &arguments.html {
-        batch.add(html, format::html::document(&view::checked(&found)));
+        made.push((html, format::html::document(&view::checked(&found))));
     }
-    batch.write()?;
     let text = format::terminal::document(&view::understood(&found), width());
-    if outputs.into_iter().any(is_stdout) {
-        print_message_lines(&text)
-    } else {
-        print_result(text)?
-    }
-    Ok(ExitStatus::Done)
+    write(arguments, &[path], &text, &view::checked_json(&found), made)
 }

@@ -7,6 +7,7 @@ use truegrind::arm::arm_file::ArmFile;
 use truegrind::arm::model::Model;
 use truegrind::calibration::measurement::simulation::Simulation;
 use truegrind::calibration::measurement::simulation::recipe::{Approach, Recipe};
+use truegrind::file_kind::FileKind;
 use truegrind::robots::foreign::Kind;
 
 use super::exit_status::ExitStatus;
@@ -37,8 +38,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Batch::check(&[&arguments.recipe], &targets)?;
     let text = files::read_text(&arguments.recipe)?;
     let name = arguments.recipe.display().to_string();
-    inputs::refuse_program(&arguments.recipe, "a recipe (.toml)")?;
-    let Recipe { about, conditions, .. } = Recipe::parse(&text, &name)?;
+    let Recipe { about, conditions, .. } = Recipe::parse(&text, &name).map_err(|e| {
+        inputs::other_kind_or(
+            &arguments.recipe,
+            &[FileKind::Recipe],
+            "a recipe (.toml), as in docs/simulate.md",
+            e,
+        )
+    })?;
     let simulation = simulation(&text, &name, arguments.seed)?;
     let mut batch = Batch::sparing([&arguments.recipe]);
     let (rows, sensor) = (simulation.rows.len(), simulation.sensor());

@@ -3,18 +3,10 @@
 use anyhow::{anyhow, bail};
 use clap::Args;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use truegrind::arm::model::Model;
-use truegrind::calibration::identification::calibration::Frames;
-use truegrind::calibration::identification::stated_frame::{
-    beside, contradicted_target, contradiction, contradiction_beside_geometry, judged_by_fit,
-    target_contradiction_by_fit, with_touched_point,
-};
-use truegrind::calibration::identification::tolerance::Tolerance;
-use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
-use truegrind::calibration::measurement::stations;
+use truegrind::calibration::identification::stated_placement::StatedPlacement;
 use truegrind::math::se3::Pose;
 
-/// Pose of the sensor, if known. Without [`FramePriorArguments`] it serves for the raw error only, and the fit determines the
+/// Place of sensor and target, if known. Without [`FramePriorArguments`] it serves for the raw error only, and the fit determines the
 /// frames.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct StatedFrameArguments {
@@ -48,95 +40,6 @@ pub(super) struct FramePriorArguments {
     touched_sigma: Option<String>,
 }
 
-impl FramePriorArguments {
-    /// Prior tolerance and starting frames of the fit. The measured point is that of `found` unless it was stated. `of_arm`: the tolerances
-    /// of arms, beside which the stated frames are judged.
-    pub(super) fn prior(
-        &self,
-        [tolerance, of_arm]: [&Tolerance; 2],
-        stated: Stated<'_>,
-        found: Frames,
-        (dataset, nominal): (&Dataset, &Model),
-    ) -> anyhow::Result<(Tolerance, Frames)> {
-        let Stated { frames: stated, touched } = stated;
-        let mut tolerance = *tolerance;
-        let touched_sigma = self.touched_sigma.as_deref().map(touched_sigma).transpose()?;
-        let touched_mm = touched_sigma.map(|(mm, _)| mm);
-        if let Some(mm) = touched_mm {
-            tolerance.target_mm = mm;
-        }
-        let turned = touched.zip(touched_sigma.and_then(|(_, rad)| rad));
-        if let Some((touched, rad)) = turned {
-            check_turn(&touched, rad, (of_arm, &found), dataset)?;
-            tolerance.target_rad = rad;
-        }
-        let in_stated_turn = |mut frames: Frames| {
-            if let Some((touched, _)) = turned {
-                frames.flange_from_target.rotation = touched.rotation;
-            }
-            frames
-        };
-        let found = match stated {
-            Some(stated) => beside(dataset, nominal, stated, touched.as_ref(), &found),
-            None => found,
-        };
-        if let Some(touched) = &touched
-            && (stated.is_none() || touched_mm.is_some())
-            && contradicted_target(dataset, nominal, touched, touched_mm.unwrap_or(0.0), &found).is_some()
-        {
-            // The arm of the data sheet alone refuses nothing.
-            let sigma_mm = touched_mm.unwrap_or(UNSTATED_MM);
-            let judged = target_contradiction_by_fit(of_arm, touched, sigma_mm, &found, (dataset, nominal));
-            if let Some(contradiction) = judged {
-                bail!("{contradiction}");
-            }
-        }
-        let Some(text) = &self.frame_sigma else {
-            if let Some(stated) = stated
-                && let Some(contradiction) = contradiction(dataset, nominal, stated, &found, 0.0)
-            {
-                let sigma = [UNSTATED_MM, UNSTATED_MM * 1e-3];
-                let stated = Frames { flange_from_target: target(touched, &found), ..stated.clone() };
-                let (judged, _) =
-                    judged_by_fit([&tolerance, of_arm], (&stated, &found), sigma, (dataset, nominal));
-                if judged != Some(None) {
-                    bail!("{contradiction}");
-                }
-            }
-            let begins_there = stated.is_none() || touched_mm.is_some();
-            let frames = match touched.filter(|_| begins_there) {
-                Some(touched) => with_touched_point(dataset, nominal, &touched, found),
-                None => found,
-            };
-            return Ok((tolerance, in_stated_turn(frames)));
-        };
-        let Some(stated) = stated else {
-            bail!("--frame-sigma needs --sensor-frame, or --outlet and --cable-zero");
-        };
-        let sigma @ [mm, rad] = frame_sigma(text)?;
-        let frames = in_stated_turn(Frames { flange_from_target: target(touched, &found), ..stated.clone() });
-        let (judged, geometry) =
-            judged_by_fit([&tolerance, of_arm], (&frames, &found), sigma, (dataset, nominal));
-        // The arm of the data sheet alone refuses nothing, but may say what is wrong with the frame.
-        let beside_nominal = contradiction(dataset, nominal, stated, &found, mm);
-        if judged != Some(None)
-            && let Some(contradiction) = beside_nominal
-        {
-            bail!("{contradiction}");
-        }
-        if let Some(geometry) = geometry
-            && let Some(contradiction) =
-                contradiction_beside_geometry(dataset, geometry, stated, sigma, of_arm.scale)
-        {
-            bail!("{contradiction}");
-        }
-        if let Some(Some(contradiction)) = judged {
-            bail!("{contradiction}");
-        }
-        Ok((Tolerance { frame_mm: mm, frame_rad: rad, ..tolerance }, frames))
-    }
-}
-
 /// Standard deviations of a stated frame (mm, rad). Without an angle 1 mm at a distance of 1 m.
 fn frame_sigma(text: &str) -> anyhow::Result<[f64; 2]> {
     let (mm, deg) = match numbers("--frame-sigma", text)?[..] {
@@ -166,185 +69,50 @@ fn touched_sigma(text: &str) -> anyhow::Result<(f64, Option<f64>)> {
     Ok((mm, deg.map(f64::to_radians)))
 }
 
-/// Standard deviations by which the readings may turn a target otherwise than it is stated.
-const TURN_SIGMAS: f64 = 5.0;
-
-/// Refuses the rotation of a target that no measurement shows, or that the readings contradict by more than an arm of these tolerances can be
-/// off: that of its six zeros adds up at the flange.
-fn check_turn(
-    touched: &Pose,
-    sigma_rad: f64,
-    (of_arm, found): (&Tolerance, &Frames),
-    dataset: &Dataset,
-) -> anyhow::Result<()> {
-    if dataset.sensor != Sensor::Pose {
-        bail!(
-            "--touched-sigma: {} shows no orientation of the target: expected MM alone, without DEG",
-            dataset.file
-        );
-    }
-    let off_rad = touched.rotation.angle_to(&found.flange_from_target.rotation);
-    if off_rad > TURN_SIGMAS * sigma_rad.hypot(6.0_f64.sqrt() * of_arm.zero_rad) {
-        let q = found.flange_from_target.rotation.quaternion();
-        bail!(
-            "--touched-point: the readings turn the target {:.1}° from there, to {:.4},{:.4},{:.4},{:.4} (w, x, y, z) on the flange: check its rotation, or \
-             state none (--touched-sigma MM)",
-            off_rad.to_degrees(),
-            q.w,
-            q.i,
-            q.j,
-            q.k
-        );
-    }
-    Ok(())
-}
-
-/// Uncertainty of a frame or point whose own is not stated, to judge it (mm).
-const UNSTATED_MM: f64 = 0.5;
-
-/// The target on the flange: where it was touched, turned as the readings say where no rotation was stated; otherwise where they put it.
-fn target(touched: Option<Pose>, found: &Frames) -> Pose {
-    let Some(touched) = touched else { return found.flange_from_target };
-    let is_turned = touched.rotation != UnitQuaternion::identity();
-    let rotation = if is_turned { touched.rotation } else { found.flange_from_target.rotation };
-    Pose::from_parts(touched.translation, rotation)
-}
-
-/// What is stated of sensor and target.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Stated<'a> {
-    /// The frames, where the sensor's place is stated.
-    pub(super) frames: Option<&'a Frames>,
-    /// The measured point, where it is stated.
-    pub(super) touched: Option<Pose>,
-}
-
-/// Data set that the frames must match.
-struct Measured<'a> {
-    file: &'a str,
-    sensor: Sensor,
-    anchors: usize,
-}
-
 impl StatedFrameArguments {
     /// Whether the place of a tracker or camera is stated.
     pub(super) fn states_sensor_frame(&self) -> bool {
         self.sensor_frame.is_some()
     }
 
-    /// The stated frames, if any.
+    /// What is stated, without its uncertainty.
     ///
     /// # Errors
-    /// The frames do not match the sensor of the data.
-    pub(super) fn frames(&self, dataset: &Dataset) -> anyhow::Result<Option<Frames>> {
-        let measured = Measured { file: &dataset.file, sensor: dataset.sensor, anchors: dataset.anchors() };
-        let disturbances = stations::disturbances(dataset.stations());
-        Ok(self.frames_of(&measured)?.map(|frames| Frames { disturbances, ..frames }))
+    /// Names the option that is no point, pose or length.
+    pub(super) fn placement(&self) -> anyhow::Result<StatedPlacement> {
+        let outlet = |text: &String| triple("--outlet", text).map(Vector3::from);
+        Ok(StatedPlacement {
+            sensor_frame: self
+                .sensor_frame
+                .as_deref()
+                .map(|text| pose("--sensor-frame", text))
+                .transpose()?,
+            outlets_mm: self.outlet.iter().map(outlet).collect::<anyhow::Result<_>>()?,
+            zeros_mm: self.cable_zero.iter().map(|text| cable_zero(text)).collect::<anyhow::Result<_>>()?,
+            touched: self.touched_point.as_deref().map(|text| pose("--touched-point", text)).transpose()?,
+            ..StatedPlacement::default()
+        })
     }
 
-    /// The stated point on the flange, if any.
+    /// [`Self::placement`] with the uncertainty of each.
     ///
     /// # Errors
-    /// It is no point.
-    pub(super) fn touched(&self) -> anyhow::Result<Option<Pose>> {
-        self.touched_point.as_deref().map(|text| pose("--touched-point", text)).transpose()
+    /// As there.
+    pub(super) fn prior(&self, sigmas: &FramePriorArguments) -> anyhow::Result<StatedPlacement> {
+        let touched_sigma = sigmas.touched_sigma.as_deref().map(touched_sigma).transpose()?;
+        Ok(StatedPlacement {
+            frame_sigma: sigmas.frame_sigma.as_deref().map(frame_sigma).transpose()?,
+            touched_sigma_mm: touched_sigma.map(|(mm, _)| mm),
+            touched_sigma_rad: touched_sigma.and_then(|(_, rad)| rad),
+            ..self.placement()?
+        })
     }
+}
 
-    /// Refuses a point that stands alone, where frames are not fitted about it.
-    pub(super) fn refuse_point_alone(&self) -> anyhow::Result<()> {
-        let placed = self.sensor_frame.is_some() || !self.outlet.is_empty() || !self.cable_zero.is_empty();
-        if self.touched_point.is_some() && !placed {
-            bail!("--touched-point needs --sensor-frame, or --outlet and --cable-zero");
-        }
-        Ok(())
-    }
-
-    /// Refuses a sensor that is stated without the target, where the placement is tested with both.
-    pub(super) fn refuse_frame_alone(&self) -> anyhow::Result<()> {
-        let placed = self.sensor_frame.is_some() || !self.outlet.is_empty() || !self.cable_zero.is_empty();
-        if placed && self.touched_point.is_none() {
-            let option =
-                if self.sensor_frame.is_some() { "--sensor-frame" } else { "--outlet and --cable-zero" };
-            bail!(
-                "--touched-point is missing: {option} tests where base and flange are, together with where the target sits on the flange \
-                 (--touched-point 0,0,0 at its centre)"
-            );
-        }
-        Ok(())
-    }
-
-    /// The frames of a planned measurement. A tracker may stand anywhere; a cable needs its outlet.
-    pub(super) fn planned(&self, sensor: Sensor) -> anyhow::Result<Frames> {
-        let anchors = self.outlet.len().max(1);
-        if sensor == Sensor::Cable && self.outlet.is_empty() {
-            bail!("--outlet X,Y,Z is missing: the position of the cable outlet in the robot base (mm)");
-        }
-        let zeros = if self.cable_zero.is_empty() && sensor == Sensor::Cable {
-            vec!["0".to_owned(); anchors]
-        } else {
-            self.cable_zero.clone()
-        };
-        let frame = self.sensor_frame.clone();
-        let frame = if sensor == Sensor::Cable { frame } else { frame.or(Some("0,0,0".to_owned())) };
-        let whole = Self { cable_zero: zeros, sensor_frame: frame, ..self.clone() };
-        let found = whole.frames_of(&Measured { file: "the plan", sensor, anchors })?;
-        found.ok_or_else(|| anyhow!("no frames are stated"))
-    }
-
-    fn frames_of(&self, dataset: &Measured<'_>) -> anyhow::Result<Option<Frames>> {
-        let cable = !self.outlet.is_empty() || !self.cable_zero.is_empty();
-        let framed = self.sensor_frame.is_some();
-        if !cable && !framed {
-            return Ok(None);
-        }
-        let anchors = dataset.anchors;
-        let mut frames = Frames::at_origin(anchors);
-        if let Some(text) = &self.touched_point {
-            frames.flange_from_target = pose("--touched-point", text)?;
-        }
-        match dataset.sensor {
-            Sensor::Cable => {
-                if framed {
-                    bail!(
-                        "--sensor-frame: {} contains cable lengths, whose sensor has no frame: use --outlet and \
-                         --cable-zero",
-                        dataset.file
-                    );
-                }
-                for (name, found) in
-                    [("--outlet", self.outlet.len()), ("--cable-zero", self.cable_zero.len())]
-                {
-                    if found != anchors {
-                        bail!(
-                            "{name}: given {found} times, expected once for each of the {anchors} cables of {}",
-                            dataset.file
-                        );
-                    }
-                }
-                for (frame_value, text) in frames.outlets_mm.iter_mut().zip(&self.outlet) {
-                    *frame_value = Vector3::from(triple("--outlet", text)?);
-                }
-                for (frame_value, text) in frames.zeros_mm.iter_mut().zip(&self.cable_zero) {
-                    let [value] = numbers("--cable-zero", text)?[..] else {
-                        bail!("--cable-zero {text}: expected one number (mm)");
-                    };
-                    *frame_value = value;
-                }
-            }
-            Sensor::Position | Sensor::Pose => {
-                if cable {
-                    bail!(
-                        "--outlet and --cable-zero: {} contains {} and no cable lengths: use --sensor-frame",
-                        dataset.file,
-                        if dataset.sensor == Sensor::Pose { "poses" } else { "positions" }
-                    );
-                }
-                if let Some(text) = &self.sensor_frame {
-                    frames.base_from_sensor = pose("--sensor-frame", text)?;
-                }
-            }
-        }
-        Ok(Some(frames))
+fn cable_zero(text: &str) -> anyhow::Result<f64> {
+    match numbers("--cable-zero", text)?[..] {
+        [value] => Ok(value),
+        _ => bail!("--cable-zero {text}: expected one number (mm)"),
     }
 }
 

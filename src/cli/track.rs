@@ -10,9 +10,11 @@ use truegrind::arm::estimated::Estimated;
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import;
-use truegrind::calibration::measurement::plausibility::{ComparedReading, plausibility};
+use truegrind::calibration::measurement::matching::Mismatch;
+use truegrind::calibration::measurement::plausibility::{ComparedReading, implausible_payload, plausibility};
 use truegrind::calibration::tracking::state::ConsumedFile;
 use truegrind::calibration::tracking::{Alarm, Options, State, TrackError, Tracker, first_poses};
+use truegrind::file_kind::FileKind;
 use truegrind::report::tracking as view;
 use truegrind::robots::sheet;
 
@@ -20,7 +22,7 @@ use super::computation::{Common, on_threads};
 use super::defect::catch_panic;
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::identify::{Angles, refuse_implausible_payload};
+use super::identify::{Angles, of_file};
 use super::inputs::{self, NamedModel, StatedRobot};
 use super::outputs::Outputs;
 use super::terminal::print_message;
@@ -100,9 +102,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     }
     measurement_files(arguments)?.iter().try_for_each(|path| files::expect(path))?;
     Batch::check(&inputs_of_run, &targets)?;
+    arguments.outputs.refuse_other_kinds()?;
     let options = options(arguments, &arm)?;
-    if let Some(seconds) = arguments.follow.filter(|s| !(*s > 0.0 && s.is_finite())) {
-        bail!("--follow {seconds}: expected seconds above 0");
+    if let Some(seconds) = arguments.follow.filter(|s| !(*s > 0.0 && *s <= MAX_FOLLOW_S)) {
+        bail!("--follow {seconds}: expected seconds above 0, up to {MAX_FOLLOW_S}");
     }
     if let Some(date) = &arguments.date {
         stamp(date)?;
@@ -132,6 +135,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     }
     Ok(if flagged { ExitStatus::Flagged } else { ExitStatus::Done })
 }
+
+/// Longest time between two looks at the measurements: a day (s).
+const MAX_FOLLOW_S: f64 = 86_400.0;
+
+/// Noisier sensors follow no arm; micrometres are meant (mm).
+const MAX_SIGMA_MM: f64 = 10.0;
 
 /// What is constant over all updates.
 struct TrackContext<'a> {
@@ -407,10 +416,15 @@ fn read(
     }
     let allow_odd_units = arguments.allow_odd_units;
     let options = import::Options { allow_odd_units, ..import::Options::default() };
-    let dataset = import::read(&files::name(path), &bytes, &options)?;
+    let dataset = import::read(&files::name(path), &bytes, &options).map_err(|e| {
+        inputs::other_kind_or(path, &[FileKind::Measurements], "measurements (.csv or .xlsx)", e)
+    })?;
     let robot = inputs::robot(arguments.robot.named().unwrap_or(arm.robot.as_str().into()));
-    if let (true, false, Ok(robot)) = (is_new, allow_odd_units, &robot) {
-        refuse_implausible_payload(&dataset, robot)?;
+    let rated_kg = robot.as_ref().ok().and_then(|robot| robot.sheet.payload_kg);
+    if let Some(rated_kg) = rated_kg.filter(|_| is_new && !allow_odd_units)
+        && let Some(suspicion) = implausible_payload(&dataset, rated_kg)
+    {
+        return Err(of_file(Mismatch::Payload(suspicion)));
     }
     let dh = match arguments.angles {
         Some(angles) => angles == Angles::Dh,
@@ -429,11 +443,14 @@ fn read(
 
 fn options(arguments: &Arguments, arm: &Estimated) -> anyhow::Result<Options> {
     let mut options = Options { sigma_mm: arguments.sigma, ..Options::default() };
-    if let Some(sigma) = arguments.sigma.filter(|s| !(*s > 0.0 && s.is_finite())) {
-        bail!("--sigma {sigma}: expected a number above 0");
+    if let Some(sigma) = arguments.sigma.filter(|s| !(*s > 0.0 && *s <= MAX_SIGMA_MM)) {
+        bail!("--sigma {sigma}: expected a length above 0 in mm, up to {MAX_SIGMA_MM} (30 µm are 0.03)");
     }
     if let Some(poses) = arguments.first_poses {
-        options.first_poses = poses.max(4);
+        if poses < 4 {
+            bail!("--first-poses {poses}: expected at least 4");
+        }
+        options.first_poses = poses;
     }
     for text in &arguments.drift {
         let (name, value) = text

@@ -22,6 +22,7 @@ use truegrind_arm::model::Model;
 use truegrind_math::statistics::{ErrorSummary, extent};
 use truegrind_math::work::report_step;
 
+use self::error::MAX_MM;
 use self::orientation::Orientation;
 use self::path::{PathFound, seen};
 use self::stations::{StationErrors, uncounted};
@@ -277,7 +278,7 @@ pub fn accept(
 }
 
 fn length(name: &'static str, found: f64) -> Result<(), AcceptError> {
-    if found > 0.0 && found.is_finite() { Ok(()) } else { Err(AcceptError::Length { name, found }) }
+    if found > 0.0 && found <= MAX_MM { Ok(()) } else { Err(AcceptError::Length { name, found }) }
 }
 
 fn angle(name: &'static str, found_rad: f64) -> Result<(), AcceptError> {

@@ -89,3 +89,4 @@ mod search;
 mod summary;
 mod handover;
 pub mod diagnose;
+pub mod measured;

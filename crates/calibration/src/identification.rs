@@ -20,6 +20,7 @@ pub(crate) mod misreading;
 pub(crate) mod mixed_rows;
 pub(crate) mod rigid_motion_columns;
 pub mod stated_frame;
+pub mod stated_placement;
 pub mod sensor_laws;
 pub(crate) mod scaled_cholesky;
 pub(crate) mod linearised_readings;

@@ -13,6 +13,7 @@ pub mod import;
 pub mod convention;
 pub mod plausibility;
 pub mod matching;
+pub mod rows_of_robot;
 mod axis_range;
 mod copies;
 mod measuring_order;

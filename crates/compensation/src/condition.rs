@@ -4,4 +4,5 @@ pub(crate) mod arm_conditions;
 pub mod other_load;
 pub mod overload;
 pub mod payload;
+pub mod stated;
 pub mod warmth;

@@ -71,6 +71,13 @@ pub struct Options {
     pub remedies: bool,
 }
 
+impl Options {
+    /// Largest [`Options::tolerance_mm`] that can be meant (mm): a path that deviates by more is another one.
+    pub const MAX_TOLERANCE_MM: f64 = 10.0;
+    /// Largest [`Options::max_correction_mm`] that can be meant (mm): ten times what an arm is off by.
+    pub const MAX_CORRECTION_MM: f64 = 100.0;
+}
+
 impl Default for Options {
     fn default() -> Self {
         Self {

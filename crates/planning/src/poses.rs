@@ -27,6 +27,7 @@ pub mod parting;
 pub mod power;
 pub mod questions;
 pub mod program;
+pub mod settings;
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;

@@ -4,17 +4,24 @@
 //! those that reach the end within the joint limits, the one farthest from singularities is chosen. Full turns of joints 4
 //! and 6 have the same distance from singularities; of these the one farthest from the joint limits is chosen.
 
+use std::path::Path;
+
 use thiserror::Error;
 
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::robots::Robot;
+use truegrind_compensation::cell::nc_setup::angle_convention;
 use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
 use truegrind_programs::draft::{Draft, Step, heading};
 use truegrind_programs::motion::{
     Frame, MotionKind, RobTarget, TargetValue, ToolValue, UNCORRECTED, WorkObjectValue,
 };
+use truegrind_programs::nc::dialect::Dialect;
+use truegrind_programs::nc::orientation::Angles;
+use truegrind_programs::{nc, rapid};
 use truegrind_surfaces::path::{PathPoint, PointKind};
 use truegrind_surfaces::{SurfaceError, SurfaceFile};
 
@@ -71,6 +78,64 @@ pub struct Toolpath {
     pub joints: Vec<Joints>,
     /// Smallest distance to singularity on the path, as [`truegrind_arm::inverse::Solution::singularity`].
     pub singularity: f64,
+}
+
+impl Toolpath {
+    /// The program for a control, or as RAPID. A, B and C of an NC program are those that the file of `robot` states, or else rotations about
+    /// the fixed x, y and z axes (W, P, R). `inline`: the targets stand in the instructions and are not declared.
+    ///
+    /// # Errors
+    /// A name that the language does not allow, or a control for which no programs are written.
+    pub fn program(
+        &self,
+        control: Option<Dialect>,
+        robot: &Robot,
+        inline: bool,
+    ) -> Result<Vec<u8>, WriteError> {
+        let draft = Draft { named_targets: !inline, ..self.draft.clone() };
+        let Some(control) = control else { return Ok(rapid::writer::write(&draft)?) };
+        let angles = robot.sheet.orientation().and_then(angle_convention).unwrap_or(Angles::Wpr);
+        Ok(nc::writer::write(&draft, control, angles)?)
+    }
+}
+
+/// The control for which a program of this name is written: Fanuc style for `.nc`, Siemens 840D for `.mpf` and `.spf`; `None` for RAPID (`.mod`
+/// and others, or no extension).
+///
+/// # Errors
+/// [`WriteError::Extension`].
+pub fn control_of(output: &Path) -> Result<Option<Dialect>, WriteError> {
+    let extension = output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("nc") => Ok(Some(Dialect::Fanuc)),
+        Some("mpf" | "spf") => Ok(Some(Dialect::Siemens)),
+        Some("mod" | "modx" | "prg" | "sys") | None => Ok(None),
+        Some(other) => {
+            Err(WriteError::Extension { file: output.display().to_string(), extension: other.to_owned() })
+        }
+    }
+}
+
+/// Why a program is not written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// The extension of another file.
+    #[error(
+        "{file}: new programs are written as RAPID (.mod), Fanuc style (.nc) or 840D (.mpf), not as .{extension}: choose one of these extensions"
+    )]
+    Extension {
+        /// The file.
+        file: String,
+        /// Its extension.
+        extension: String,
+    },
+    /// As RAPID.
+    #[error(transparent)]
+    Rapid(#[from] rapid::writer::WriteError),
+    /// As an NC program.
+    #[error(transparent)]
+    Nc(#[from] nc::writer::WriteError),
 }
 
 /// Makes the program of a surface file for a nominal arm. `robot` is named in errors and comments.

@@ -300,6 +300,33 @@ pub fn json(robot: &Robot) -> Value {
     })
 }
 
+/// The catalogue as JSON, an entry for each row of its table.
+pub fn catalogue_json(robots: &[Robot]) -> Value {
+    let entries: Vec<Value> = robots
+        .iter()
+        .map(|robot| {
+            let sheet = &robot.sheet;
+            json!({
+                "name": sheet.name,
+                "maker": sheet.maker,
+                "model": sheet.model,
+                "payload_kg": sheet.payload_kg,
+                "reach_mm": sheet.reach_mm,
+                "repeatability_mm": sheet.repeatability_mm,
+                "programs": sheet.dialect.map(dialect),
+            })
+        })
+        .collect();
+    json!({ "schema": "truegrind.robots/1", "robots": entries })
+}
+
+/// What was understood of a robot file, beside the robot itself.
+pub fn checked_json(found: &ImportedRobot) -> Value {
+    let mut out = json(&found.robot);
+    out["understood"] = json!(found.summary);
+    out
+}
+
 /// A table without its title, for use below a heading.
 fn untitled(table: Table) -> Table {
     Table { title: String::new(), ..table }

@@ -9,7 +9,7 @@ use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::options::{Circles, Emit, Options};
 use truegrind::compensation::risk::placement::Placement;
 
-use crate::cli::cell_arguments::CellArguments;
+use crate::cli::cell_arguments::{CellArguments, check_length};
 use crate::cli::computation::Common;
 use crate::cli::inputs::StatedRobot;
 use crate::cli::outputs::Outputs;
@@ -183,11 +183,8 @@ impl Arguments {
 
     /// Refuses numbers out of range.
     pub(super) fn check_numbers(&self) -> anyhow::Result<()> {
-        for (value, name) in [(self.tolerance, "--tolerance"), (self.max_correction, "--max-correction")] {
-            if !(value > 0.0 && value.is_finite()) {
-                bail!("{name} {value}: expected a length above 0 in mm");
-            }
-        }
+        check_length("--tolerance", self.tolerance, Options::MAX_TOLERANCE_MM)?;
+        check_length("--max-correction", self.max_correction, Options::MAX_CORRECTION_MM)?;
         if !(0.0..=1.0).contains(&self.max_risk) {
             bail!("--max-risk {}: expected a probability from 0 to 1", self.max_risk);
         }

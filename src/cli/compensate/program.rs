@@ -167,6 +167,7 @@ fn check_motions(
     }
     let known = programs.files.iter().any(|(path, _)| Language::by_name(&files::name(path)).is_some());
     if !known && context.corrector.is_some() {
+        programs.refuse_other_kinds()?;
         bail!(
             "{}: no motion found, and the file extension is not known: expected RAPID (.mod, .prg, .sys, .pgf) or NC code (.nc, \
              .mpf, .h and others)",

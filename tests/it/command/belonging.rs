@@ -340,6 +340,9 @@ fn a_file_in_the_wrong_place_is_told_what_it_is() {
     let dir = shop();
     let at = dir.path();
     fs::write(at.join("cell.toml"), "[[tool]]\nname = \"t\"\norigin = \"metrology\"\n").unwrap();
+    fs::write(at.join("empty.toml"), "\n").unwrap();
+    fs::write(at.join("broken.toml"), "robot = \"abb-irb-120\"\n[poses]\nkind = \"any\"\n[sensor]\n")
+        .unwrap();
     let ur5 = ["path", "blade.toml", "--robot", "universal-robots-ur5", "-o", "ur.mod"];
     let (code, _, err) =
         truegrind(at, &["compensate", "blade.mod", "--model", "model.toml", "-o", "real.mod"]);
@@ -370,7 +373,118 @@ fn a_file_in_the_wrong_place_is_told_what_it_is() {
             &["compensate", "blade.mod", "--model", "blade.nc", "-o", "x.mod"],
             ["this is an NC program", "expected a model file"],
         ),
-        (&["simulate", "model.toml", "-o", "x.csv"], ["model.toml: not a recipe: line", "docs/simulate.md"]),
+        (&["simulate", "model.toml", "-o", "x.csv"], ["this is a model file", "docs/simulate.md"]),
+        (
+            &["simulate", "broken.toml", "-o", "x.csv"],
+            ["broken.toml: not a recipe: line", "docs/simulate.md"],
+        ),
+        (
+            &["identify", "model.toml", "--robot", "abb-irb-120"],
+            ["this is a model file, which --model reads", "expected measurements"],
+        ),
+        (
+            &["diagnose", "poses.csv", "--robot", "abb-irb-120", "--also", "cell.toml"],
+            ["this is a cell file, which --cell reads", "expected measurements"],
+        ),
+        (
+            &["accept", "blade.toml", "--model", "model.toml", "--tolerance", "1"],
+            ["this is a surface file, which path and --surface read", "expected measurements"],
+        ),
+        (
+            &["accept", "poses.csv", "--model", "poses.csv", "--tolerance", "1"],
+            [
+                "these are measurements, which identify, diagnose, track and accept read",
+                "expected a model file",
+            ],
+        ),
+        (
+            &["compensate", "blade.mod", "--model", "blade.toml", "-o", "x.mod"],
+            ["this is a surface file", "expected a model file"],
+        ),
+        (
+            &["compensate", "blade.mod", "--model", "model.toml", "-o", "x.mod", "--cell", "blade.mod"],
+            ["this is a RAPID program", "expected a cell file"],
+        ),
+        (
+            &["compensate", "blade.mod", "--model", "model.toml", "-o", "x.mod", "--cell", "empty.toml"],
+            ["this file is empty", "expected a cell file"],
+        ),
+        (
+            &["compensate", "poses.csv", "--model", "model.toml", "-o", "x.mod"],
+            ["these are measurements", "expected a program: RAPID"],
+        ),
+        (
+            &["deviation", "model.toml", "--model", "model.toml"],
+            ["this is a model file", "expected a program: RAPID"],
+        ),
+        (&["cell", "poses.csv", "-o", "x.toml"], ["these are measurements", "expected a program: RAPID"]),
+        (
+            &["deviation", "blade.mod", "--model", "model.toml", "--actual", "model.toml"],
+            ["this is a model file", "expected an arm file of `simulate --arm`"],
+        ),
+        (
+            &["identify", "poses.csv", "--robot", "model.toml"],
+            ["this is a model file", "expected a robot file"],
+        ),
+        (&["robots", "--check", "poses.csv"], ["these are measurements", "expected a robot file"]),
+        (
+            &["plan", "--robot", "abb-irb-120", "--sensor", "tracker", "--for", "poses.csv"],
+            ["these are measurements", "expected a diagnosis"],
+        ),
+        (
+            &["compare", "poses.csv", "--robot", "abb-irb-120", "--experiment", "cell.toml"],
+            ["this is a cell file", "expected an experiment"],
+        ),
+        (&["gather", "poses.csv"], ["poses.csv: is a file", "expected the folder of a run"]),
+        (
+            &["identify", "poses.csv", "--robot", "abb-irb-120", "--json", "x.csv"],
+            ["x.csv: JSON is written here", "expected the extension .json, not .csv"],
+        ),
+        (
+            &["identify", "poses.csv", "--robot", "abb-irb-120", "--html", "x.toml"],
+            ["an HTML page is written here", "not .toml"],
+        ),
+        (&["robots", "--json", "x.html"], ["JSON is written here", "not .html"]),
+        (
+            &["compensate", "blade.mod", "--model", "model.toml", "-o", "x.mod", "--tolerance", "50"],
+            ["--tolerance 50: expected a length above 0 in mm", "up to 10 (50 µm are 0.05)"],
+        ),
+        (
+            &["compensate", "blade.mod", "--model", "model.toml", "-o", "x.mod", "--max-correction", "1000"],
+            ["--max-correction 1000: expected a length above 0 in mm", "up to 100"],
+        ),
+        (
+            &["deviation", "blade.mod", "--model", "model.toml", "--tolerance", "inf"],
+            ["--tolerance inf: expected a length above 0 in mm", "up to 10"],
+        ),
+        (
+            &["accept", "poses.csv", "--model", "model.toml", "--tolerance", "300"],
+            ["the tolerance 300: expected a length above 0 in mm", "up to 100"],
+        ),
+        (
+            &["plan", "--robot", "abb-irb-120", "--sensor", "tracker", "--touched-point", "0,0,60000"],
+            ["--touched-point 0,0,60000: 60000 mm from the flange", "the arm itself reaches"],
+        ),
+        (
+            &["track", "poses.csv", "--model", "model.toml", "--follow", "1e6"],
+            ["--follow 1000000: expected seconds above 0", "up to 86400"],
+        ),
+        (
+            &["track", "poses.csv", "--model", "model.toml", "--first-poses", "0"],
+            ["--first-poses 0", "expected at least 4"],
+        ),
+        (
+            &["plan", "--robot", "abb-irb-120", "--sensor", "tracker", "--settle", "1e300"],
+            ["--settle", "expected seconds, up to 86400"],
+        ),
+        (
+            &["plan", "--robot", "abb-irb-120", "--sensor", "tracker", "--candidates", "0"],
+            ["--candidates 0: expected 1 to 100000", "2000 are usual"],
+        ),
+        (
+            &["diagnose", "poses.csv", "--robot", "abb-irb-120", "--most", "0"],
+            ["--most 0: expected 1 to 200 causes", "`truegrind identify`"],
+        ),
         (&["simulate", "model.toml", "-o", "x.xlsx"], ["CSV is written here", "x.xlsx"]),
         (
             &["identify", "poses.csv", "--robot", "abb-irb-120", "--csv", "x.xlsx"],

@@ -53,7 +53,7 @@ pub(super) fn verbs() -> Vec<Verb> {
         Verb {
             base: &["robots", "--check", "robot.toml"],
             inputs: &["robot.toml"],
-            outputs: &["-o", "--html"],
+            outputs: &["-o", "--json", "--html"],
             needs: &[],
             others: &[&["--check", "--base", "--tip", "--ground-joint-3"]],
         },

@@ -6,12 +6,15 @@ use super::decision::MIN_POSES;
 use crate::identification::start::StartError;
 use crate::measurement::dataset::PathPoint;
 
+/// Largest tolerance, or uncertainty of a sensor, that can be meant (mm).
+pub(super) const MAX_MM: f64 = 100.0;
+
 /// Why an acceptance test is impossible.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum AcceptError {
     /// The tolerance or the uncertainty is no positive length.
-    #[error("{name} {found}: expected a length above 0 in mm")]
+    #[error("{name} {found}: expected a length above 0 in mm, up to {MAX_MM} (50 µm are 0.05)")]
     Length {
         /// Which.
         name: &'static str,

@@ -11,7 +11,7 @@ use super::copies::without_copies;
 use super::dataset::Dataset;
 use super::measuring_order::in_order_of_measuring;
 use super::plausibility::{
-    ComparedReading, UnitSuspicion, implausible_temperature, implausible_time, plausibility,
+    ComparedReading, PayloadSuspicion, UnitSuspicion, implausible_temperature, implausible_time, plausibility,
 };
 use super::reach::without_impossible_readings;
 use super::stations::{StationError, in_frame_of_first, rows_of_stations};
@@ -27,6 +27,9 @@ pub enum Mismatch {
     /// The clock or the thermometer is in another unit.
     #[error("{0}")]
     Condition(String),
+    /// A logged payload is far above the rated one.
+    #[error("{0}")]
+    Payload(PayloadSuspicion),
     /// DH angles of an arm whose joint map is singular.
     #[error("{robot}: its joint map cannot be inverted, so DH angles cannot be read")]
     JointMap {

@@ -55,6 +55,18 @@ impl Rig {
         }
     }
 
+    /// The same tracker or camera in another place; a cable stays where it is.
+    pub fn at_station(&self, place: Pose) -> Self {
+        let mut moved = self.clone();
+        match &mut moved {
+            Rig::Position { base_from_sensor, .. } | Rig::Pose { base_from_sensor, .. } => {
+                *base_from_sensor = place;
+            }
+            Rig::Cable { .. } => {}
+        }
+        moved
+    }
+
     /// The target's position in the flange frame (mm).
     pub fn target_on_flange_mm(&self) -> Vector3<f64> {
         match self {

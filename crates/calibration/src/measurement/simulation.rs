@@ -39,7 +39,7 @@ pub struct Simulation {
     pub actual: Model,
     /// The arm of the data sheet.
     pub nominal: Model,
-    /// The sensor before any fault.
+    /// The sensor before any fault, at its first station.
     pub rig: Rig,
     /// The rows before rounding and noise.
     pub rows: Vec<SimulatedRow>,
@@ -54,6 +54,8 @@ pub struct SimulatedRow {
     pub condition: Condition,
     /// Cable outlet, 0-based.
     pub anchor: usize,
+    /// Station of the tracker or camera, 0-based.
+    pub station: usize,
     /// The noise-free reading.
     pub reading: Reading,
 }
@@ -112,15 +114,15 @@ impl Recipe {
         self.check()?;
         let nominal = resolve(&self.robot).map_err(|message| RecipeError::Robot { message })?;
         let actual = arm::actual(&nominal, &self.arm)?;
-        let rig = self.sensor.rig();
+        let rigs = self.rigs();
         let mut rng = stream(self.seed, Stream::Noise);
         let mut rows = Vec::new();
         let mut lines = Vec::new();
-        for planned in poses::plan(self, &nominal, &rig)? {
+        for planned in poses::plan(self, &nominal, &rigs)? {
             checkpoint();
             let number = rows.len();
             let mut truth = planned.condition;
-            let mut seen_by = rig.clone();
+            let mut seen_by = rigs[planned.station].clone();
             for fault in &self.fault {
                 fault.before(number, &mut seen_by, &mut truth);
             }
@@ -147,16 +149,18 @@ impl Recipe {
                 readout,
                 condition: planned.condition,
                 anchor: planned.anchor,
+                station: planned.station,
             });
             rows.push(SimulatedRow {
                 joints: planned.joints,
                 condition: truth,
                 anchor: planned.anchor,
+                station: planned.station,
                 reading: exact,
             });
         }
-        let csv = table::csv(self, &rig, &lines);
-        Ok(Simulation { csv, actual, nominal, rig, rows })
+        let csv = table::csv(self, &lines);
+        Ok(Simulation { csv, actual, nominal, rig: self.sensor.rig(), rows })
     }
 }
 

@@ -138,6 +138,12 @@ pub struct Open {
     pub joint_scatters: bool,
 }
 
+/// The robot of a diagnosis, as its file names it.
+pub fn robot_of(text: &str) -> Option<String> {
+    let diagnosis: serde_json::Value = serde_json::from_str(text).ok()?;
+    diagnosis["dataset"]["robot"].as_str().map(str::to_owned)
+}
+
 /// What a diagnosis left open: everything, or only the finding with a number (from 1, as in the report).
 ///
 /// # Errors

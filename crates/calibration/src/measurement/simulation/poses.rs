@@ -22,15 +22,18 @@ pub(super) struct Planned {
     pub(super) joints: Joints,
     pub(super) condition: Condition,
     pub(super) anchor: usize,
+    pub(super) station: usize,
 }
 
-pub(super) fn plan(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<Vec<Planned>, RecipeError> {
-    let (poses, repeats) = distinct(recipe, nominal, rig)?;
+pub(super) fn plan(recipe: &Recipe, nominal: &Model, rigs: &[Rig]) -> Result<Vec<Planned>, RecipeError> {
+    let (poses, repeats) = distinct(recipe, nominal, rigs)?;
     let mut rng = stream(recipe.seed, Stream::Conditions);
     let mut out = Vec::new();
     let mut before: Option<Joints> = None;
-    // Repeats follow the whole round, so that they include the drift of the run.
-    for joints in (0..repeats.max(1)).flat_map(|_| &poses) {
+    // Repeats follow the whole round, so that they include the drift of the run; with several stations, before the sensor is moved on.
+    let rounds =
+        poses.chunk_by(|a, b| a.1 == b.1).flat_map(|round| (0..repeats.max(1)).flat_map(move |_| round));
+    for (joints, station) in rounds {
         let sides: Vec<[i8; 6]> = match recipe.conditions.approach {
             Approach::Unknown => vec![[0; 6]],
             Approach::Random => vec![std::array::from_fn(|_| if rng.random_bool(0.5) { 1 } else { -1 })],
@@ -46,7 +49,7 @@ pub(super) fn plan(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<Vec<Pl
         for approach in sides {
             for anchor in 0..recipe.sensor.anchors() {
                 let condition = Condition { approach, ..Condition::default() };
-                out.push(Planned { joints: *joints, condition, anchor });
+                out.push(Planned { joints: *joints, condition, anchor, station: *station });
             }
         }
     }
@@ -69,11 +72,17 @@ fn set_conditions(rows: &mut [Planned], conditions: &RunConditions) {
     }
 }
 
-/// The distinct poses, and how often each is measured.
-fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>, usize), RecipeError> {
+/// The distinct poses, each with the station that sees it, and how often each is measured.
+fn distinct(
+    recipe: &Recipe,
+    nominal: &Model,
+    rigs: &[Rig],
+) -> Result<(Vec<(Joints, usize)>, usize), RecipeError> {
     let arm = nominal.at_condition(&Condition::default());
-    let seen = |q: &Joints| {
+    let station_of = |pose: usize, poses: usize| pose * rigs.len() / poses.max(1);
+    let seen = |(q, station): &(Joints, usize)| {
         checkpoint();
+        let rig = &rigs[*station];
         let flange = arm.forward(q);
         let at = flange * Point3::from(rig.target_on_flange_mm());
         let inside =
@@ -108,8 +117,9 @@ fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>,
             while poses.len() < *count && tries < most {
                 tries += 1;
                 let q = Joints::from_fn(|j, _| low[j] + (high[j] - low[j]) * rng.random::<f64>());
-                if limits.sums.iter().all(|sum| sum.holds(&q, -margin)) && seen(&q) {
-                    poses.push(q);
+                let pose = (q, station_of(poses.len(), *count));
+                if limits.sums.iter().all(|sum| sum.holds(&q, -margin)) && seen(&pose) {
+                    poses.push(pose);
                 }
             }
             (poses, *repeats, *count, tries)
@@ -126,10 +136,14 @@ fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>,
                 }
                 from_degrees(&q)
             };
-            ((0..count).map(at).filter(seen).collect(), *repeats, 1, count)
+            let all = (0..count).map(|index| (at(index), station_of(index, count)));
+            (all.filter(seen).collect(), *repeats, 1, count)
         }
         Poses::List { joints_deg, repeats } => {
-            (joints_deg.iter().map(from_degrees).filter(seen).collect(), *repeats, 1, joints_deg.len())
+            let count = joints_deg.len();
+            let all = joints_deg.iter().enumerate();
+            let all = all.map(|(index, q)| (from_degrees(q), station_of(index, count)));
+            (all.filter(seen).collect(), *repeats, 1, count)
         }
     };
     if poses.len() < wanted.max(1) {

@@ -75,6 +75,10 @@ pub struct Recipe {
     pub conditions: RunConditions,
     /// The sensor.
     pub sensor: SensorSetup,
+    /// Further places of a tracker or camera, behind that of `sensor`: consecutive shares of the poses, equal in number, are measured from
+    /// each in turn.
+    #[serde(default)]
+    pub station: Vec<Frame>,
     /// Noise of sensor and arm.
     #[serde(default)]
     pub noise: Noise,
@@ -390,6 +394,13 @@ pub struct Rounding {
 }
 
 impl Recipe {
+    /// The sensor at each of its stations.
+    pub fn rigs(&self) -> Vec<Rig> {
+        let first = self.sensor.rig();
+        let further = self.station.iter().map(|frame| first.at_station(frame.pose()));
+        std::iter::once(first.clone()).chain(further).collect()
+    }
+
     /// Reads a recipe; `file` is named in errors.
     pub fn parse(text: &str, file: &str) -> Result<Self, RecipeError> {
         truegrind_math::toml_text::read(text).map_err(|error| {
@@ -405,6 +416,13 @@ impl Recipe {
             Err(RecipeError::Invalid { key: key.into(), found: found.into(), expected })
         };
         let cable = matches!(self.sensor, SensorSetup::Cable { .. });
+        if cable && !self.station.is_empty() {
+            return wrong(
+                "station",
+                "a cable",
+                "sensor.kind = \"position\" or \"pose\": the outlets of a cable are those of outlets_mm",
+            );
+        }
         if self.noise.sigma_deg != 0.0 && !matches!(self.sensor, SensorSetup::Pose { .. }) {
             return wrong(
                 "noise.sigma_deg",

@@ -4,7 +4,6 @@ use nalgebra::Vector3;
 
 use super::recipe::{Approach, Recipe};
 use crate::measurement::dataset::{Reading, Sensor};
-use crate::measurement::sensor::Rig;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_math::work::checkpoint;
@@ -16,6 +15,7 @@ pub(super) struct Logged {
     pub(super) readout: Vector3<f64>,
     pub(super) condition: Condition,
     pub(super) anchor: usize,
+    pub(super) station: usize,
 }
 
 /// Format of a number: rounded to an optional step, with the decimals that the step needs; never a negative zero.
@@ -42,7 +42,7 @@ impl Format {
     }
 }
 
-pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
+pub(super) fn csv(recipe: &Recipe, rows: &[Logged]) -> String {
     let angle = Format::new(recipe.rounding.angles_deg, 6);
     let length = Format::new(recipe.rounding.reading_mm, 4);
     let readout = Format::new(recipe.rounding.readout_mm, 4);
@@ -57,9 +57,10 @@ pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
     let centre = payload && first.payload_centre_mm != [0.0; 3];
     let approach = logged && recipe.conditions.approach != Approach::Unknown;
     let anchors = recipe.sensor.anchors() > 1;
+    let stations = !recipe.station.is_empty();
 
     let mut header: Vec<String> = (1..=6).map(|j| format!("q{j}")).collect();
-    let sensor: &[&str] = match rig.sensor() {
+    let sensor: &[&str] = match recipe.sensor.rig().sensor() {
         Sensor::Cable => &["L"],
         Sensor::Position => &["measured_x", "measured_y", "measured_z"],
         Sensor::Pose => &[
@@ -83,6 +84,7 @@ pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
     name(centre, &["payload_x", "payload_y", "payload_z"]);
     name(approach, &["approach1", "approach2", "approach3", "approach4", "approach5", "approach6"]);
     name(anchors, &["anchor"]);
+    name(stations, &["station"]);
     let mut out = header.join(",") + "\n";
     for row in rows {
         checkpoint();
@@ -114,6 +116,9 @@ pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
         }
         if anchors {
             cells.push((row.anchor + 1).to_string());
+        }
+        if stations {
+            cells.push((row.station + 1).to_string());
         }
         out += &cells.join(",");
         out.push('\n');

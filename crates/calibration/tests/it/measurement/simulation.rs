@@ -227,6 +227,47 @@ fn several_outlets_are_told_apart() {
 /// The class: a recipe's number that is none, or that asks for more than anyone measures, gives NaN in a file that says
 /// nothing of it, or a run that does not end.
 #[test]
+fn a_tracker_that_was_set_up_in_several_places_sees_its_share_of_the_poses_from_each() {
+    let further = "[[station]]\nposition_mm = [-1800, 900, 250]\nwxyz = [0.9, 0, 0, 0.4]\n\
+        [[station]]\nposition_mm = [300, 2100, 400]\n";
+    // No place sees the target all around.
+    let view = "[view]\ntilt_deg = 70\n";
+    for sensor in [TRACKER, SIX] {
+        let (simulation, mut data) = measure(&random(30, &format!("{sensor}{further}{view}")));
+        assert_eq!(data.stations(), 3);
+        let stations: Vec<usize> = simulation.rows.iter().map(|row| row.station).collect();
+        assert_eq!(stations, (0..30).map(|row| row / 10).collect::<Vec<_>>());
+        assert_eq!(stations, data.rows.iter().map(|row| row.anchor).collect::<Vec<_>>());
+        let recipe = Recipe::parse(&random(30, &format!("{sensor}{further}{view}")), "recipe.toml").unwrap();
+        for (row, read) in simulation.rows.iter().zip(&data.rows) {
+            let flange = simulation.actual.forward(&row.joints, &row.condition);
+            let rig = &recipe.rigs()[row.station];
+            assert!(rig.sees(&recipe.view.limits(), &flange, 0));
+            let seen = rig.predict(&flange, 0).unwrap();
+            assert!(residual(&read.reading, &seen).iter().all(|off| off.abs() < 1e-3));
+        }
+        // What `identify` reads: all rows in the frame of the first place.
+        data = truegrind_calibration::measurement::rows_of_robot::rows_of_robot(
+            data,
+            &robots::load("abb-irb-120").unwrap(),
+            None,
+            false,
+        )
+        .unwrap();
+        let first = &recipe.rigs()[0];
+        for (row, read) in simulation.rows.iter().zip(&data.rows) {
+            let flange = simulation.actual.forward(&row.joints, &row.condition);
+            let off = residual(&read.reading, &first.predict(&flange, 0).unwrap());
+            assert!(off.iter().all(|off| off.abs() < 2e-3), "{off:?}");
+        }
+    }
+    // One place gives the bytes of a recipe that knows of none.
+    assert!(!measure(&random(5, TRACKER)).0.csv.contains("station"));
+    let cable = try_measure(&random(5, &format!("{CABLE}{further}"))).unwrap_err().to_string();
+    assert!(cable.contains("station") && cable.contains("outlets_mm"), "{cable}");
+}
+
+#[test]
 fn a_recipe_with_any_number_wrong_is_refused_or_gives_finite_rows() {
     use rayon::prelude::*;
     let effects = "[[arm.effect]]\neffect = \"gear-eccentricity\"\njoint = 0\norder = 1.0\nsine_rad = 3e-4\ncosine_rad = 1e-4\n\

@@ -41,6 +41,9 @@ impl Recipe {
         view(&self.view).map_err(|invalid| invalid.within("view"))?;
         conditions(&self.conditions).map_err(|invalid| invalid.within("circumstances"))?;
         sensor(&self.sensor).map_err(|invalid| invalid.within("sensor"))?;
+        for (number, place) in self.station.iter().enumerate() {
+            frame("frame", place).map_err(|invalid| invalid.within(&format!("station {}", number + 1)))?;
+        }
         for (key, sigma) in [
             ("noise.sigma_mm", self.noise.sigma_mm),
             ("noise.per_metre_mm", self.noise.per_metre_mm),
