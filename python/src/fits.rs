@@ -121,8 +121,8 @@ impl PyIdentification {
 /// sensor's scale (%); by default a fault of the scale is considered possible. ``angles``: ``"logged"`` or ``"dh"``, by default that of
 /// the robot file. ``sensor_frame``: frame of a tracker or camera in the robot base, x, y, z (mm) or x, y, z, qw, qx, qy, qz;
 /// ``outlets_mm`` and ``cable_zeros_mm``: outlets of cables in the base, and reading minus free length of each; ``touched_point``: hook or
-/// reflector on the flange. With ``frame_sigma_mm`` (and ``frame_sigma_deg``; by default 1 mm at 1 m) and ``touched_sigma_mm``, their standard
-/// deviations, the fit takes them as a prior, so that the placement of a path can be corrected; a placement that the readings contradict raises
+/// reflector on the flange. With ``frame_sigma_mm`` (and ``frame_sigma_deg``; by default 1 mm at 1 m) and ``touched_sigma_mm`` (and
+/// ``touched_sigma_deg`` for the rotation of a target whose pose is measured), their standard deviations, the fit takes them as a prior, so that the placement of a path can be corrected; a placement that the readings contradict raises
 /// ``ArgumentError``. ``progress`` is called with each step. The result does not depend on the number of threads.
 #[pyfunction]
 #[pyo3(
@@ -131,7 +131,7 @@ impl PyIdentification {
         dataset, robot, *, method = "lm", held_out = 0.2, seed = 0, fuse_readout = true, limit_rmse_mm = None,
         limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, sensor_scale_sigma_percent = None,
         angles: "Literal['logged', 'dh'] | None" = None, sensor_frame = None, outlets_mm = None, cable_zeros_mm = None,
-        touched_point = None, frame_sigma_mm = None, frame_sigma_deg = None, touched_sigma_mm = None, threads = None,
+        touched_point = None, frame_sigma_mm = None, frame_sigma_deg = None, touched_sigma_mm = None, touched_sigma_deg = None, threads = None,
         progress = None
     )
 )]
@@ -157,6 +157,7 @@ pub(crate) fn identify_(
     frame_sigma_mm: Option<f64>,
     frame_sigma_deg: Option<f64>,
     touched_sigma_mm: Option<f64>,
+    touched_sigma_deg: Option<f64>,
     threads: Option<i64>,
     progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyIdentification> {
@@ -168,6 +169,7 @@ pub(crate) fn identify_(
         frame_sigma_mm,
         frame_sigma_deg,
         touched_sigma_mm,
+        touched_sigma_deg,
     }
     .stated()?;
     let robot = named(&robot)?;
@@ -352,7 +354,7 @@ impl PyDiagnosis {
 /// causes. ``blocks``: number of contiguous blocks held out in turn. Tolerances (mm, °): prior σ of the links.
 /// ``sensor_scale_sigma_percent``: standard uncertainty of the sensor's scale (%), such as 0.001 for a tracker that agreed with a scale
 /// bar; by default a fault of the scale is considered possible. ``also``: further datasets of the same arm, on which the models are tested
-/// with only the frames refitted. ``sensor_frame`` to ``touched_sigma_mm``: as for ``identify``.
+/// with only the frames refitted. ``sensor_frame`` to ``touched_sigma_deg``: as for ``identify``.
 #[pyfunction]
 #[pyo3(
     name = "diagnose",
@@ -360,7 +362,7 @@ impl PyDiagnosis {
         dataset, robot, *, alpha = 0.01, most = 20, blocks = 10, smooth = false, fuse_readout = true, limit_rmse_mm = None,
         limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, sensor_scale_sigma_percent = None, seed = 0,
         also = Vec::new(), angles: "Literal['logged', 'dh'] | None" = None, sensor_frame = None, outlets_mm = None,
-        cable_zeros_mm = None, touched_point = None, frame_sigma_mm = None, frame_sigma_deg = None, touched_sigma_mm = None, threads = None, progress = None
+        cable_zeros_mm = None, touched_point = None, frame_sigma_mm = None, frame_sigma_deg = None, touched_sigma_mm = None, touched_sigma_deg = None, threads = None, progress = None
     )
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
@@ -388,6 +390,7 @@ pub(crate) fn diagnose_(
     frame_sigma_mm: Option<f64>,
     frame_sigma_deg: Option<f64>,
     touched_sigma_mm: Option<f64>,
+    touched_sigma_deg: Option<f64>,
     threads: Option<i64>,
     progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyDiagnosis> {
@@ -399,6 +402,7 @@ pub(crate) fn diagnose_(
         frame_sigma_mm,
         frame_sigma_deg,
         touched_sigma_mm,
+        touched_sigma_deg,
     }
     .stated()?;
     let robot = named(&robot)?;

@@ -46,6 +46,7 @@ pub(crate) struct Placement {
     pub(crate) frame_sigma_mm: Option<f64>,
     pub(crate) frame_sigma_deg: Option<f64>,
     pub(crate) touched_sigma_mm: Option<f64>,
+    pub(crate) touched_sigma_deg: Option<f64>,
 }
 
 impl Placement {
@@ -82,6 +83,10 @@ impl Placement {
             touched: at("touched_point", self.touched_point)?,
             frame_sigma,
             touched_sigma_mm: self.touched_sigma_mm.map(|mm| positive("touched_sigma_mm", mm)).transpose()?,
+            touched_sigma_rad: self
+                .touched_sigma_deg
+                .map(|deg| positive("touched_sigma_deg", deg).map(f64::to_radians))
+                .transpose()?,
         })
     }
 }
