@@ -160,7 +160,7 @@ fn variants(listed: &[Arc<Candidate>], subject: &Subject<'_>, fit: &Extended) ->
         let same = listed.iter().filter(|c| c.cause.is_same_finding(cause));
         let tried = same.map(|c| c.tried).fold(1.0, f64::max);
         let candidate = |fault: EmpiricalFault| {
-            let variant = Disturbance::new(Kind::Empirical(fault), profile.clone());
+            let variant = Disturbance::new(Kind::Empirical(fault), *profile);
             let candidate =
                 Candidate::measurement(variant, &subject.observed.dataset, subject.nominal, subject.frames);
             Arc::new(Candidate { tried, ..candidate })

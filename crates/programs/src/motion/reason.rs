@@ -56,7 +56,7 @@ reasons! {
         IndependentAxis => "an axis is, or may be, in independent mode or locked (SingArea \\LockAxis4): the target does not determine its position",
         MovingWorkObject => "the work object is moved by an external axis",
         ToolUnknown => "the tool frame is unknown",
-        LengthAllowance => "the tool is called with a length allowance (TOOL CALL … DL), and is another tool than without: state its frame in the cell file, under the name with the allowance ([[tool]] name = \"T1 DL+0.5\")",
+        LengthAllowance => "the tool is called with a length allowance (TOOL CALL … DL), and is another tool than without: state its frame in the cell file, under the name with the allowance (such as \"T1 DL+0.5\")",
         WorkObjectUnknown => "the frame of the work object or work offset is unknown",
         ToolAssigned => "the tool is or may be assigned while the program runs",
         WorkObjectAssigned => "the work object is or may be assigned while the program runs",
