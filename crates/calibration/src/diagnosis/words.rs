@@ -12,6 +12,7 @@ use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::{EmpiricalFault, Overturning, Pole};
 use nalgebra::Vector3;
 use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::loaded_backlash::LoadedBacklash;
 
 /// Values and standard deviations of the parameters of cause `index`.
 pub fn found_parameters(fit: &Extended, index: usize) -> Vec<FoundParameter> {
@@ -183,9 +184,7 @@ pub fn describe_cause(
             "joint {joint} has {:.4}° of backlash between approaches from below and from above",
             value.to_degrees()
         ),
-        Cause::Arm(Effect::LoadedBacklash(play)) => {
-            is_closed_by_gravity(joint, value, (play.friction_nm * 1e3).round() as u32)
-        }
+        Cause::Arm(Effect::LoadedBacklash(play)) => is_closed_by_gravity(value, play),
         Cause::Arm(Effect::ThermalDrift(t)) if t.growth == 0.0 => {
             format!("the links grow by {:.1} µm per metre and kelvin", t.growth_per_k * 1e6)
         }
@@ -320,7 +319,10 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
         ),
         EmpiricalFault::NonlinearStiffness { .. } => is_nonlinear(joint),
         EmpiricalFault::Hardening { .. } => stiffens(joint, value),
-        EmpiricalFault::LoadedPlay { friction_mnm, .. } => is_closed_by_gravity(joint, value, friction_mnm),
+        EmpiricalFault::LoadedPlay { .. } => match form.effect() {
+            Some(Effect::LoadedBacklash(play)) => is_closed_by_gravity(value, &play),
+            _ => String::new(),
+        },
         EmpiricalFault::TwoJointGear { other, .. } => depends_on_two(joint, other),
         EmpiricalFault::AxisWobble { .. } => wobbles(joint, [0, 1, 2, 3].map(|k| value_of(parameters, k))),
         EmpiricalFault::Refraction => format!(
@@ -410,18 +412,20 @@ fn stiffens(joint: usize, deflection: f64) -> String {
     )
 }
 
-/// Of a joint (from 1) with this play (rad), whose load must exceed a friction (mN m) to close it.
-fn is_closed_by_gravity(joint: usize, play: f64, friction_mnm: u32) -> String {
-    let below = match friction_mnm {
-        0 => String::new(),
-        _ => format!(
-            "; below {:.1} N m of it, held by friction, the side of approach does",
-            1e-3 * f64::from(friction_mnm)
-        ),
+/// Of a play of this size (rad), which its load closes.
+fn is_closed_by_gravity(size: f64, play: &LoadedBacklash) -> String {
+    let held = if play.friction_nm == 0.0 {
+        String::new()
+    } else if play.mass.is_empty() {
+        format!("; below {:.1} N m, friction holds it on the side from which it came", play.friction_nm)
+    } else {
+        // Under masses that are only assumed the torque is none that could be measured.
+        "; where the load is small, friction holds it on the side from which it came".to_owned()
     };
     format!(
-        "joint {joint} has {:.4}° of backlash that gravity closes: the load decides which flank of the gear carries it{below}",
-        play.to_degrees()
+        "joint {} has {:.4}° of backlash that gravity closes: the load decides which flank of the gear carries it{held}",
+        play.joint + 1,
+        size.to_degrees()
     )
 }
 

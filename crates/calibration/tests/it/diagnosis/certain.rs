@@ -443,7 +443,7 @@ fn friction_holds_a_play_that_its_load_would_close() {
         let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 600, 85)).dataset);
         let play = &identified(&found)[0];
         assert_eq!((play.effect.as_str(), play.joints.as_deref()), ("backlash", Some(&[3][..])));
-        assert!(play.cause.contains("held by friction"), "{}", play.cause);
+        assert!(play.cause.contains("friction holds it"), "{}", play.cause);
         let written = loaded_backlash(&found);
         assert!((written.play_rad - 0.0012).abs() < 1e-4, "{written:?}");
         let largest_nm = written.closing_nm / 0.02;
