@@ -393,6 +393,19 @@ impl ConfirmationContext<'_> {
     }
 }
 
+/// The rows (numbers) of the other shifts of the kind of cause `index` that were not removed.
+fn others_of_kind(index: usize, own: &[WithColumns], removed: &[usize]) -> Vec<[usize; 2]> {
+    let kind = |of: &WithColumns| match &of.candidate.cause {
+        Cause::Measurement(disturbance) => Some(disturbance.kind.clone()),
+        Cause::Arm(_) => None,
+    };
+    let others = own.iter().enumerate().filter(|(k, _)| *k != index && !removed.contains(k));
+    others
+        .filter(|(_, other)| kind(other) == kind(&own[index]))
+        .filter_map(|(_, other)| other.candidate.cause.rows())
+        .collect()
+}
+
 /// The rows of one half.
 struct Half<'a> {
     confirming: &'a ConfirmationContext<'a>,
@@ -473,7 +486,7 @@ impl<'a> Half<'a> {
                 let changed = apart > chance && apart > CHANGED * CHANGED * lambda(before);
                 let cause = &tried.candidate.cause;
                 let recovered = if cause.rows().is_some() {
-                    self.recovers_shift(tried, own, &design, &score)
+                    self.recovers_shift(tried, &others_of_kind(k, own, removed), &design, &score)
                 } else {
                     let is_of = |s: &WithColumns, cause: &Cause| s.candidate.cause.is_same_finding(cause);
                     let same = selected.iter().any(|s| is_of(s, cause));
@@ -490,12 +503,12 @@ impl<'a> Half<'a> {
             .collect()
     }
 
-    /// Whether a shift is recovered in the same rows, or, beside others of its kind among the causes `own`, which are free, at the rows where it
-    /// alone changes the level: of three levels two shifts are known by each pair of them.
+    /// Whether a shift is recovered in the same rows, or at the rows where it alone changes the level: beside `others_of_kind`, the rows of shifts
+    /// of its kind that are free, of three levels each two of the three intervals say the same.
     fn recovers_shift(
         &self,
         tried: &WithColumns,
-        own: &[WithColumns],
+        others_of_kind: &[[usize; 2]],
         design: &Design,
         score: &Score,
     ) -> bool {
@@ -521,29 +534,30 @@ impl<'a> Half<'a> {
             let both = mine + (best.to + 1 - best.from) - shared;
             // A shift in rows a to b is equivalent to one in all other rows.
             let n = self.numbers.len();
-            let (others, rest) = (n - mine, best.to + 1 - best.from - shared);
-            let complement = rest as f64 / (others + (best.to + 1 - best.from) - rest).max(1) as f64;
-            let changes = |from: usize, to: usize| {
-                let row = |number: usize| self.numbers.partition_point(|n| *n < number);
-                [row(from), row(to + 1)]
-            };
-            let of_others: Vec<usize> = own
-                .iter()
-                .filter_map(|other| match &other.candidate.cause {
-                    Cause::Measurement(d) if d.kind == disturbance.kind => other.candidate.cause.rows(),
-                    _ => None,
-                })
-                .filter(|rows| *rows != [from, to])
-                .flat_map(|[from, to]| changes(from, to))
-                .collect();
-            let near = |at: usize, row: usize| 2.0 * at.abs_diff(row) as f64 <= (1.0 - OVERLAP) * mine as f64;
-            let alone = |at: &usize| *at > 0 && *at < n && !of_others.contains(at);
-            let mut alone = changes(from, to).into_iter().filter(alone).peekable();
-            let is_found = !of_others.is_empty()
-                && alone.peek().is_some()
-                && alone.all(|at| near(at, best.from) || near(at, best.to + 1));
+            let (outside, rest) = (n - mine, best.to + 1 - best.from - shared);
+            let complement = rest as f64 / (outside + (best.to + 1 - best.from) - rest).max(1) as f64;
+            let is_found = self.changes_level_alike([from, to], [best.from, best.to], others_of_kind, mine);
             shared as f64 / both.max(1) as f64 >= OVERLAP || complement >= OVERLAP || is_found
         })
+    }
+
+    /// Whether an interval, by indices, changes the level at the rows (numbers) where a shift of `mine` rows does and no other of its kind.
+    fn changes_level_alike(
+        &self,
+        [from, to]: [usize; 2],
+        best: [usize; 2],
+        others_of_kind: &[[usize; 2]],
+        mine: usize,
+    ) -> bool {
+        let row = |number: usize| self.numbers.partition_point(|n| *n < number);
+        let changes = |[from, to]: [usize; 2]| [row(from), row(to + 1)];
+        let of_others: Vec<usize> = others_of_kind.iter().copied().flat_map(changes).collect();
+        let alone = |at: &usize| (1..self.numbers.len()).contains(at) && !of_others.contains(at);
+        let alone: Vec<usize> = changes([from, to]).into_iter().filter(alone).collect();
+        let near = |at: usize, row: usize| 2.0 * at.abs_diff(row) as f64 <= (1.0 - OVERLAP) * mine as f64;
+        !of_others.is_empty()
+            && !alone.is_empty()
+            && alone.iter().all(|&at| near(at, best[0]) || near(at, best[1] + 1))
     }
 
     /// Forward selection from scratch, each step to first order; best first. `design` has none of the causes.
