@@ -161,8 +161,12 @@ fn variants(listed: &[Arc<Candidate>], subject: &Subject<'_>, fit: &Extended) ->
         let tried = same.map(|c| c.tried).fold(1.0, f64::max);
         let candidate = |fault: EmpiricalFault| {
             let variant = Disturbance::new(Kind::Empirical(fault), *profile);
-            let candidate =
-                Candidate::measurement(variant, &subject.observed.dataset, subject.nominal, subject.frames);
+            let candidate = Candidate::measurement(
+                variant,
+                &subject.observed.dataset,
+                subject.nominal,
+                subject.evaluated_at,
+            );
             Arc::new(Candidate { tried, ..candidate })
         };
         nonlinear_springs::variants(*fault, subject).into_par_iter().map(candidate).collect::<Vec<_>>()
@@ -174,7 +178,7 @@ fn variants(listed: &[Arc<Candidate>], subject: &Subject<'_>, fit: &Extended) ->
 fn shifts(catalogue: &Catalogue, subject: &Subject<'_>, fit: &Extended, design: &Design) -> Vec<Shift> {
     let known = known_load(fit).map(|kind| {
         let always = Disturbance::new(kind, Profile::Constant);
-        Candidate::measurement(always, &subject.observed.dataset, subject.nominal, subject.frames)
+        Candidate::measurement(always, &subject.observed.dataset, subject.nominal, subject.evaluated_at)
     });
     let known = known.map(Arc::new);
     let shifts: Vec<&Arc<Candidate>> = catalogue.shifts.iter().chain(&known).collect();

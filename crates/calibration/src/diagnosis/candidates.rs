@@ -73,7 +73,8 @@ impl Catalogue {
                     _ => 1.0,
                 };
                 let disturbance = Disturbance::new(kind, Profile::Constant);
-                let candidate = Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames);
+                let candidate =
+                    Candidate::measurement(disturbance, dataset, subject.nominal, subject.evaluated_at);
                 Arc::new(Candidate { tried, ..candidate })
             })
             .collect();

@@ -87,7 +87,7 @@ impl Candidate {
         match cause {
             Cause::Arm(effect) if effect.first_moved_frame().is_some() => Self::moving_links(effect, subject),
             Cause::Arm(effect) => Self::arm(effect.clone(), dataset, nominal),
-            Cause::Measurement(d) => Self::measurement(d.clone(), dataset, nominal, subject.frames),
+            Cause::Measurement(d) => Self::measurement(d.clone(), dataset, nominal, subject.evaluated_at),
         }
     }
 
@@ -134,7 +134,7 @@ impl Candidate {
     /// A candidate that moves links, which is a sensor that moves.
     fn moving_links(effect: &Effect, subject: &Subject<'_>) -> Self {
         let dataset = &subject.observed.dataset;
-        let motions = motions_by_links(effect, dataset, subject.nominal, subject.frames);
+        let motions = motions_by_links(effect, dataset, subject.nominal, subject.evaluated_at);
         let coordinates = if dataset.sensor == Sensor::Pose { 6 } else { 3 };
         let regressors = motions.iter().map(|rows| {
             let of = |k: usize| rows.iter().map(|motion| motion[k / 3][k % 3]).collect::<Vec<f64>>();
@@ -504,7 +504,7 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
                 Disturbance::new(kind, profile),
                 dataset,
                 subject.nominal,
-                subject.frames,
+                subject.evaluated_at,
             )
         })
         .collect()
@@ -568,8 +568,8 @@ fn drum(dataset: &Dataset) -> EmpiricalFault {
 /// Whether every target lies within 45° of the z axis of the sensor's frame, on one side, as what a camera sees does.
 fn may_be_camera(subject: &Subject<'_>) -> bool {
     let posed = subject.nominal.at_condition(&Condition::default());
-    let target = Point3::from(subject.frames.flange_from_target.translation.vector);
-    let sensor_from_base = subject.frames.base_from_sensor.inverse();
+    let target = Point3::from(subject.evaluated_at.flange_from_target.translation.vector);
+    let sensor_from_base = subject.evaluated_at.base_from_sensor.inverse();
     let mut seen = subject
         .observed
         .dataset
@@ -584,8 +584,8 @@ fn may_be_camera(subject: &Subject<'_>) -> bool {
 /// A range fault over the distances of the rows.
 fn range(subject: &Subject<'_>) -> EmpiricalFault {
     let posed = subject.nominal.at_condition(&Condition::default());
-    let target = Point3::from(subject.frames.flange_from_target.translation.vector);
-    let sensor = subject.frames.base_from_sensor.translation.vector;
+    let target = Point3::from(subject.evaluated_at.flange_from_target.translation.vector);
+    let sensor = subject.evaluated_at.base_from_sensor.translation.vector;
     let rows = subject.observed.dataset.rows.iter();
     let distances = rows.map(|row| ((posed.forward(&row.joints) * target).coords - sensor).norm());
     let (low, high) =

@@ -98,7 +98,7 @@ impl Confounding<'_> {
         let mut out = Vec::new();
         if self.by_one_cable && all(&|cause| cause.kind() == CauseKind::BaseTilt) {
             out.push(
-                "by one cable a base that tilts looks like a cable that sags or whose pulley is worn"
+                "one cable shows what a base that tilts does along it and not across it, and along it a cable that sags or whose pulley is worn may do the same"
                     .to_owned(),
             );
         }

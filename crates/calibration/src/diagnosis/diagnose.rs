@@ -78,9 +78,12 @@ pub fn diagnose(
 ) -> Result<Diagnosed, DiagnoseError> {
     let prepared = prepare(dataset, nominal_arm, options.fuse_readout);
     let tolerance = Tolerance { scale: options.arm_tolerance.scale, ..options.tolerance };
+    let observed = &prepared.observed;
     let subject =
-        Subject { observed: &prepared.observed, nominal: nominal_arm, frames, tolerance: &tolerance };
+        Subject { observed, nominal: nominal_arm, frames, evaluated_at: frames, tolerance: &tolerance };
     let registered = nominal(&subject);
+    let fitted_frames = registered.frames.clone();
+    let subject = Subject { evaluated_at: &fitted_frames, ..subject };
     refuse_other_arm(dataset, robot, &registered, &subject)?;
     let needed = poses_needed_at_least(dataset, nominal_arm);
     let thin_rows = thin_rows(&prepared.observed);

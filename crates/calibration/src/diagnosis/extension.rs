@@ -38,8 +38,24 @@ pub struct Subject<'a> {
     pub nominal: &'a Model,
     /// Starting frames, without disturbances other than further stations.
     pub frames: &'a Frames,
+    /// Frames that regressors of causes are evaluated at: fitted ones, since a cable's hook starts on the flange, wherever it is.
+    pub evaluated_at: &'a Frames,
     /// Priors of links and frames.
     pub tolerance: &'a Tolerance,
+}
+
+impl Subject<'_> {
+    /// The calibration problem of its rows, starting at an arm and frames.
+    fn problem(
+        &self,
+        start: (&Model, &Frames),
+        parameters: &[Parameter],
+        priors: &[Prior],
+        weights: &[Weight],
+    ) -> CalibrationProblem {
+        let dataset = &self.observed.dataset;
+        CalibrationProblem::evaluated_at(self.evaluated_at, dataset, start, parameters, priors, weights)
+    }
 }
 
 /// The free parameters of a fit.
@@ -231,8 +247,7 @@ pub(super) fn warm_fit(
     let repeated = RepeatedPoses::of(dataset);
     let mut round = 0;
     let unweighted = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; n];
-    let plain_task =
-        CalibrationProblem::new(dataset, &start_model, &start_frames, &parameters, &priors, &unweighted);
+    let plain_task = subject.problem((&start_model, &start_frames), &parameters, &priors, &unweighted);
     let (mut model, mut frames) = plain_task.apply(&x);
     let mut nearby = near.is_some() && free_parameters == FreeParameters::All;
     loop {
@@ -511,8 +526,7 @@ impl Extended {
             })
         });
         let weights = with_robust_weights(&self.weights, &self.robust_weight);
-        let dataset = &subject.observed.dataset;
-        let problem = CalibrationProblem::new(dataset, &model, &frames, &parameters, &priors, &weights);
+        let problem = subject.problem((&model, &frames), &parameters, &priors, &weights);
         let estimate = Estimate { x: x.clone(), covariance, ..self.estimate };
         Self { parameters, priors, problem, x, estimate, ..self }
     }

@@ -62,17 +62,17 @@ fn errors_of(
     let prepared = prepare(&other.at_unless_logged(models.condition), models.nominal, fuse_readout);
     let mut with_faults = frames.clone();
     with_faults.disturbances.extend_from_slice(models.faults);
-    let all = [
-        (models.nominal, frames),
-        (models.geometric, frames),
-        (models.extended, &with_faults),
-        (models.written, frames),
-    ];
-    let errors = all.map(|(model, frames)| {
-        let subject = Subject { observed: &prepared.observed, nominal: model, frames, tolerance };
-        let registered = fit(&subject, &[], FreeParameters::Frames, None);
-        errors_on(&prepared.observed, &registered.model, &registered.frames)
-    });
+    let observed = &prepared.observed;
+    let registered = |(nominal, frames, evaluated_at): (&Model, &Frames, &Frames)| {
+        let subject = Subject { observed, nominal, frames, evaluated_at, tolerance };
+        fit(&subject, &[], FreeParameters::Frames, None)
+    };
+    let of_sheet = registered((models.nominal, frames, frames));
+    let at = &of_sheet.frames;
+    let others = [(models.geometric, frames), (models.extended, &with_faults), (models.written, frames)];
+    let [geometric, extended, written] = others.map(|(model, frames)| registered((model, frames, at)));
+    let errors =
+        [&of_sheet, &geometric, &extended, &written].map(|fit| errors_on(observed, &fit.model, &fit.frames));
     (errors, prepared.observed)
 }
 
@@ -207,7 +207,8 @@ impl Diagnosed {
         if differ_by(written, nominal) > SURELY {
             return Some(Foreign::BelowDataSheet);
         }
-        let subject = Subject { observed, nominal: &estimated.model, frames, tolerance };
+        let nominal = &estimated.model;
+        let subject = Subject { observed, nominal, frames, evaluated_at: frames, tolerance };
         let another = fit(&subject, &[], FreeParameters::All, None);
         let readings = observed.dataset.rows.len() * sensor.scalars();
         let factor = if sensor == Sensor::Cable { CHANGED_CABLE } else { CHANGED };

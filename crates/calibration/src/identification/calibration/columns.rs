@@ -174,11 +174,11 @@ impl Columns {
         }
     }
 
-    /// Columns of a data set; `angles` are reused where given.
+    /// Columns of a data set, what displaces the sensor evaluated at the frames `at`; `angles` are reused where given.
     pub(super) fn of(
         dataset: &Dataset,
         start: &Model,
-        frames: &Frames,
+        (frames, at): (&Frames, &Frames),
         parameters: &[Parameter],
         angles: Option<&Arc<Angles>>,
     ) -> Self {
@@ -244,8 +244,8 @@ impl Columns {
             });
             all.collect()
         };
-        out.shifts = of_sensor(&|form| regressors::sensor_shifts(form, dataset, start, frames));
-        out.turns = of_sensor(&|form| regressors::sensor_turns(form, dataset, start, frames));
+        out.shifts = of_sensor(&|form| regressors::sensor_shifts(form, dataset, start, at));
+        out.turns = of_sensor(&|form| regressors::sensor_turns(form, dataset, start, at));
         out.effect_at = vec![usize::MAX; parameters.len()];
         for (e, effect) in out.effects.iter().enumerate() {
             out.effect_at[effect.index] = e;

@@ -39,7 +39,19 @@ impl CalibrationProblem {
         priors: &[Prior],
         weights: &[Weight],
     ) -> Self {
-        let columns = Columns::of(dataset, start, frames, parameters, None);
+        Self::evaluated_at(frames, dataset, (start, frames), parameters, priors, weights)
+    }
+
+    /// The same, with regressors of disturbances that displace the sensor evaluated at the frames `at` in place of the starting ones.
+    pub(crate) fn evaluated_at(
+        at: &Frames,
+        dataset: &Dataset,
+        (start, frames): (&Model, &Frames),
+        parameters: &[Parameter],
+        priors: &[Prior],
+        weights: &[Weight],
+    ) -> Self {
+        let columns = Columns::of(dataset, start, (frames, at), parameters, None);
         Self::with(columns, dataset, (start, frames), parameters, priors, weights)
     }
 
@@ -52,7 +64,7 @@ impl CalibrationProblem {
         parameters: &[Parameter],
         weights: &[Weight],
     ) -> Self {
-        let columns = Columns::of(dataset, start, frames, parameters, Some(&self.columns.angles));
+        let columns = Columns::of(dataset, start, (frames, frames), parameters, Some(&self.columns.angles));
         Self::with(columns, dataset, (start, frames), parameters, &[], weights)
     }
 

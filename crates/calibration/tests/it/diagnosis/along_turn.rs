@@ -43,6 +43,7 @@ fn neighbouring_orders_are_one_error_that_changes_along_the_turn() {
         observed: &prepared.observed,
         nominal: &nominal,
         frames: &frames,
+        evaluated_at: &frames,
         tolerance: &options.tolerance,
     };
     assert_eq!(nominal.mapped(&data.rows[0].joints)[3], data.rows[0].joints[3]);

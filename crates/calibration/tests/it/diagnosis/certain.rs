@@ -466,6 +466,22 @@ fn a_base_that_tilts_is_told_with_its_size() {
     assert!((base.term[0].tilt_rad_per_nm - 1e-5).abs() < 3e-6, "{base:?}");
 }
 
+/// The same by a cable, whose hook stands beside the flange and whose start is on it: no joint yields, though one of them does nearly the same to
+/// a length. What the base does across the cable is not seen, and so it is not certain.
+#[test]
+fn by_a_cable_a_base_that_tilts_is_no_compliance() {
+    let hidden = [Hidden::Tilt { rad_per_nm: 2e-5 }];
+    for seed in [91, 92] {
+        let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Cable, 600, seed)).dataset);
+        let tilt = &found.diagnosis.findings[0];
+        assert_eq!((tilt.effect.as_str(), tilt.confidence), ("base-tilt", Confidence::Ambiguous));
+        let rivals = tilt.alternatives.iter();
+        let compliance = rivals.filter(|rival| rival.effect == "joint-compliance");
+        assert!(compliance.into_iter().all(|rival| rival.twice_log_bayes_factor > 6.0), "{tilt:?}");
+        assert_eq!(identified(&found), Vec::<&Finding>::new());
+    }
+}
+
 /// A tracker with the constant of another reflector reads all distances too long by as much: no scale, and no link.
 #[test]
 fn a_wrong_reflector_constant_is_told_with_its_size() {

@@ -72,6 +72,7 @@ fn geometry(dataset: &Dataset) -> Extended {
         observed: &prepared.observed,
         nominal: &arm,
         frames: &frames,
+        evaluated_at: &frames,
         tolerance: &options.tolerance,
     };
     fit(&subject, &[], FreeParameters::All, None)
@@ -144,6 +145,7 @@ fn the_first_joint_yields_only_where_another_shows_that_the_arm_leans() {
         observed: &prepared.observed,
         nominal: &arm,
         frames: &frames,
+        evaluated_at: &frames,
         tolerance: &options.tolerance,
     };
     let catalogue = Catalogue::of(&subject);

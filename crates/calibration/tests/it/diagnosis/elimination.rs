@@ -52,6 +52,7 @@ fn compared(unknown: &[Hidden], correlated: bool) {
         observed: &prepared.observed,
         nominal: &nominal,
         frames: &frames,
+        evaluated_at: &frames,
         tolerance: &options.tolerance,
     };
     let causes: Vec<Cause> = listed.iter().filter_map(scenarios::cause).collect();

@@ -160,6 +160,7 @@ fn fitted(rows: usize, then: impl FnOnce(&Subject<'_>, &Extended)) {
         observed: &prepared.observed,
         nominal: &nominal,
         frames: &frames,
+        evaluated_at: &frames,
         tolerance: &options.tolerance,
     };
     let causes: Vec<Cause> = hidden.iter().filter_map(scenarios::cause).collect();

@@ -96,6 +96,7 @@ fn causes_of_one_finding_are_no_rivals_of_each_other() {
         observed: &prepared.observed,
         nominal: &nominal,
         frames: &frames,
+        evaluated_at: &frames,
         tolerance: &options.tolerance,
     };
     let causes: Vec<Cause> = [gear(1.0), gear(1.15)].iter().filter_map(scenarios::cause).collect();

@@ -191,6 +191,7 @@ pub fn outcome(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Outcome {
         observed: &diagnosed.prepared.observed,
         nominal,
         frames: &frames,
+        evaluated_at: &frames,
         tolerance: &options.tolerance,
     };
     let lambdas = lambdas(&subject, &diagnosed, &run, setup, hidden.len());
