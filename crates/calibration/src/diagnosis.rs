@@ -17,7 +17,8 @@
 //! 8. [`residual_tests`], `data_quality` and `testability`: outliers, noise that grows with range, unexplained structure;
 //!    rounding and contradicting columns; effects that the data cannot detect.
 //! 9. [`discrepancy`] with [`marginal`]: random functions for model discrepancy. `confirmation`: a cause is identified only if it
-//!    remains significant with them and is selected again in [`halves`] of the rows (stability selection).
+//!    remains significant with them and is selected again in [`halves`] of the rows (stability selection); deflections and tilts must
+//!    be those of weight ([`lump_direction`], [`overturning_masses`]).
 //! 10. `findings` and `merged`: findings, ranked by their `contribution`, with doubts where a larger fault confounds them
 //!     (`confounding`); `unexplained`: the rest, with what a planner needs of it
 //!     ([`something_else`]); [`decision`]: shares of causes that cannot be told apart, and the measurement that decides. `written_model`: the arm for compensation, fitted beside the
@@ -63,6 +64,7 @@ pub mod design;
 mod link_geometry;
 mod link_growth;
 pub mod lump_direction;
+pub mod overturning_masses;
 pub mod held_out;
 pub mod score;
 pub mod intervals;

@@ -29,6 +29,7 @@ use super::halves::{HALVES, halves};
 use super::intervals::ShiftScan;
 use super::link_growth;
 use super::lump_direction;
+use super::overturning_masses;
 use super::pure_products::PureProducts;
 use super::score::{Score, score_columns, score_from, score_projected};
 use super::selection::{Accepted, Options, contains_cause};
@@ -287,17 +288,19 @@ impl ConfirmationContext<'_> {
         sum * sum > CONFOUNDED * count * square
     }
 
-    /// Whether a deflection along horizontal axes, if it is one, is that of gravity in one direction.
-    fn is_one_direction(&self, index: usize) -> bool {
-        let (Cause::Arm(Effect::LumpedCompliance(load)), Some(covariance)) =
-            (&self.fit.causes[index], &self.fit.estimate.covariance)
-        else {
-            return true;
-        };
+    /// Whether loads can be what bends a joint or tilts the base: those of one direction of gravity, and of positive masses.
+    fn is_under_weight(&self, index: usize) -> bool {
+        let Some(covariance) = &self.fit.estimate.covariance else { return true };
         let own = self.fit.parameter_indices(index);
         let values: Vec<f64> = own.iter().map(|&k| self.fit.x[k]).collect();
         let covariance = covariance.select_rows(&own).select_columns(&own);
-        lump_direction::is_one_direction(load, &values, &covariance)
+        let cause = &self.fit.causes[index];
+        match cause {
+            Cause::Arm(Effect::LumpedCompliance(load)) => {
+                lump_direction::is_one_direction(load, &values, &covariance)
+            }
+            _ => overturning_masses::are_weights(cause, &values, &covariance),
+        }
     }
 
     /// Whether the links grew by more in these rows than heat does.
@@ -384,7 +387,7 @@ impl ConfirmationContext<'_> {
             testable: 0,
             changed: 0,
             plausible: own.candidate.cause.has_plausible_sign()
-                && self.is_one_direction(index)
+                && self.is_under_weight(index)
                 && !self.is_confounded_with_lag(&own.candidate.cause)
                 && !(own.candidate.cause.is_growth_of_arm() && self.grows_beyond_heat()),
             lifts: matches!(&own.candidate.cause, Cause::Arm(Effect::JointCompliance(_)))

@@ -19,10 +19,11 @@ use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::extension::{Extended, FreeParameters, Subject, fit};
 use truegrind_calibration::diagnosis::finding::Confidence;
 use truegrind_calibration::diagnosis::lump_direction::is_one_direction;
+use truegrind_calibration::diagnosis::overturning_masses::are_weights;
 use truegrind_calibration::diagnosis::preparation::prepare;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use truegrind_calibration::measurement::sensor::empirical::EmpiricalFault;
+use truegrind_calibration::measurement::sensor::empirical::{EmpiricalFault, Overturning};
 
 use super::scenarios::frames;
 use super::simulator::{Hidden, Log, Setup, run};
@@ -203,4 +204,27 @@ fn a_tilt_has_one_direction_for_all_lumps() {
     // Too little is known to say so.
     let wide = DMatrix::from_diagonal_element(6, 6, 1e-9);
     assert!(is_one_direction(&load, &[1.2e-5, 1.6e-5, -2.4e-5, 1.8e-5, 0.6e-5, 0.8e-5], &wide));
+}
+
+/// What overturns a base is weight: of an arm whose masses are not known no lump is negative but for a link that lies behind its joint.
+#[test]
+fn what_overturns_a_base_is_weight() {
+    let of = |axes| {
+        let fault = EmpiricalFault::BaseTilt { load: Overturning::Lumps, axes, deep: false };
+        Cause::Measurement(Disturbance::new(Kind::Empirical(fault), Profile::Constant))
+    };
+    let sure = DMatrix::from_diagonal_element(3, 3, 1e-12);
+    let alike = |values: [f64; 3], covariance: &DMatrix<f64>| are_weights(&of(None), &values, covariance);
+    assert!(alike([7e-5, 1e-5, 2e-6], &sure));
+    assert!(alike([7e-5, -1e-5, 2e-6], &sure), "a forearm behind the elbow");
+    assert!(!alike([-4e-5, 5e-5, 2e-6], &sure), "an elbow that rises where the wrist falls");
+    assert!(!alike([-4e-5, -1e-5, -2e-6], &sure));
+    assert!(alike([-4e-5, 5e-5, 2e-6], &DMatrix::from_diagonal_element(3, 3, 1e-9)), "not known so well");
+    // Stiffer about one axis than about the other; what couples them has either sign.
+    let sure = DMatrix::from_diagonal_element(9, 9, 1e-12);
+    let unlike = |about_y: f64| {
+        let values = [7e-5, 1e-5, 2e-6, about_y, 1e-5, 2e-6, -4e-5, -1e-5, -2e-6];
+        are_weights(&of(Some([0, 1])), &values, &sure)
+    };
+    assert!(unlike(3e-5) && !unlike(-3e-5));
 }
