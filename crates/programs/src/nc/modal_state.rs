@@ -310,9 +310,6 @@ pub(super) struct ModalState {
     pub(super) modal_call: Option<Reason>,
     /// Tool position in the work frame (mm), coordinate shift included.
     pub(super) position: [Evaluated; 3],
-    /// The axes that have not moved since the frame was displaced. They stand where they stood, and a setting of the control says
-    /// whether an increment begins there or at the same coordinate in the new frame.
-    pub(super) stands_in_old_frame: [bool; 3],
     pub(super) orientation: Orientation,
     /// The coordinate shift of G92 and G52, added to programmed values (mm).
     pub(super) shift: [Evaluated; 3],
@@ -367,7 +364,6 @@ impl ModalState {
             mode_before_cycle: MotionMode::Unset,
             modal_call: None,
             position: [Err(Reason::PositionUnknown); 3],
-            stands_in_old_frame: [false; 3],
             orientation: Orientation::unknown(Reason::OrientationUnknown, Ok(0.0)),
             shift: [Ok(0.0); 3],
             origin_set: false,
@@ -483,9 +479,6 @@ impl ModalState {
 impl Lattice for ModalState {
     fn join(&mut self, other: &Self) {
         join_all(&mut self.position, &other.position);
-        for (stands, theirs) in self.stands_in_old_frame.iter_mut().zip(other.stands_in_old_frame) {
-            *stands |= theirs;
-        }
         join_all(&mut self.pole, &other.pole);
         self.orientation.join(&other.orientation);
         self.groups.join(&other.groups);

@@ -130,9 +130,7 @@ impl Interpreter<'_, '_> {
             absolute: state.groups.absolute(),
             unit_mm: state.groups.unit_mm(),
             distance_mode_unknown: state.unknown_reason(ModalGroup::DistanceMode.bit()).is_some(),
-            start: std::array::from_fn(|axis| {
-                state.position[axis].ok().filter(|_| !self.begins_in_old_frame(block, axis))
-            }),
+            start: state.position.map(Result::ok),
             start_angles: angles.map(Result::ok),
             angles: angles.map(Result::ok),
             start_vector: vector,
@@ -185,25 +183,13 @@ impl Interpreter<'_, '_> {
         let mut to = self.axis_values(block, &block.axes, from, self.state.groups.unit_mm());
         for (axis, to) in to.iter_mut().enumerate() {
             let Some(index) = block.axes[axis] else { continue };
-            if self.begins_in_old_frame(block, axis) {
-                *to = to.and(Err(Reason::PositionUnknown));
-            } else if !self.is_increment(block, index) {
+            let increment =
+                self.evaluate_word(&block.words[index]).1.unwrap_or(!self.state.groups.absolute());
+            if !increment {
                 *to = to.and_then(|value| self.state.shift[axis].map(|shift| value + shift));
             }
         }
         to
-    }
-
-    /// Whether a word of the block is an increment.
-    fn is_increment(&self, block: &Block<'_>, index: usize) -> bool {
-        self.evaluate_word(&block.words[index]).1.unwrap_or(!self.state.groups.absolute())
-    }
-
-    /// Whether an axis moves by an increment, and this begins in the frame before a displacement or after it, as a setting of the
-    /// control says.
-    fn begins_in_old_frame(&self, block: &Block<'_>, axis: usize) -> bool {
-        self.state.stands_in_old_frame[axis]
-            && block.axes[axis].is_some_and(|index| self.is_increment(block, index))
     }
 
     /// Whether the numbers of a target are literals in the block.
@@ -305,9 +291,6 @@ impl Interpreter<'_, '_> {
         self.listing.nc.at_poles.extend(at_pole.map(|words| (index, words)));
         self.state.preceding = Preceding::after(index);
         self.state.position = to;
-        for (stands, word) in self.state.stands_in_old_frame.iter_mut().zip(block.axes) {
-            *stands &= word.is_none();
-        }
         self.update_after_motion(block, mode, machine);
         // A tool vector holds only in its own LN; later blocks have no word that states the orientation.
         if heidenhain && self.state.orientation.mode == OrientationMode::Vector {
