@@ -14,7 +14,7 @@ use crate::condition::overload::{is_far_above_rating, stated_overload};
 use crate::cut::{Cuts, may_cut};
 use crate::deviation::MotionStatus;
 use crate::frames::taught::contradictions;
-use crate::frames::undeclared;
+use crate::frames::{tip_in_wrist, undeclared};
 use crate::options::{Emit, Options};
 use crate::plan::Plan;
 use crate::plan::reason::OutcomeReason;
@@ -197,6 +197,11 @@ fn agreed(
     let corrected = corrected.map(|outcome| (outcome.motion as usize, outcome.sigma_mm.get()));
     planned.other_loads = other_loads(program.listing(), arm, (loads, &options.condition), corrected);
     planned.notes.extend(stated.map(|stated| stated.note));
+    let corrected = planned.outcomes.iter().filter(|outcome| outcome.status.is_written());
+    let corrected = corrected.map(|outcome| outcome.motion as usize);
+    let tips = tip_in_wrist::notes(program.listing(), &arm.nominal, corrected);
+    planned.has_tip_in_wrist = !tips.is_empty();
+    planned.notes.extend(tips);
     if program.language() == Language::Rapid
         && let Some(off) = single_precision(&planned.changes)
     {

@@ -6,4 +6,5 @@ mod known_tools;
 pub mod surface_frames;
 pub mod taught;
 pub(crate) mod teaching_geometry;
+pub(crate) mod tip_in_wrist;
 pub mod undeclared;

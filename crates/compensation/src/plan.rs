@@ -83,6 +83,8 @@ pub struct Plan {
     pub other_loads: usize,
     /// Whether program or job state a mass far above what the robot is rated for: the model was not measured under it.
     pub is_overloaded: bool,
+    /// Whether a corrected motion has a tool whose tip lies behind the flange, within the wrist.
+    pub has_tip_in_wrist: bool,
     /// Steps between corrected motions and neighbours that are left; known once the program is rewritten.
     pub steps: Option<StepsToLeft>,
     /// How the position of each work object was treated.

@@ -23,6 +23,7 @@ mod joint_lines;
 mod singularity;
 mod start;
 mod taught;
+mod tip_in_wrist;
 
 use nalgebra::{DMatrix, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};

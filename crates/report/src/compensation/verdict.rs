@@ -96,6 +96,10 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
             "Corrected for a mass far above what the robot is rated for: check it before running the program",
         ),
         (
+            plan.has_tip_in_wrist,
+            "Corrected for a tool whose tip lies within the wrist: check its frame before running the program",
+        ),
+        (
             paths(plan, listing)[2] > 0,
             "Corrected, except for some lines or arcs, where the workpiece deviates as before",
         ),

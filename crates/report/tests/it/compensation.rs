@@ -302,6 +302,9 @@ fn verdict_and_page_tell_what_to_look_at() {
     let heavy = Plan { is_overloaded: true, ..plan.clone() };
     let text = terminal::document(&view::summary(&heavy, &listing, &files), 200);
     assert!(text.contains("[warning] Corrected for a mass far above what the robot is rated for"), "{text}");
+    let inverted = Plan { has_tip_in_wrist: true, ..plan.clone() };
+    let text = terminal::document(&view::summary(&inverted, &listing, &files), 200);
+    assert!(text.contains("[warning] Corrected for a tool whose tip lies within the wrist"), "{text}");
     let mut open = listing.clone();
     open.nc.unstated_lengths = vec![listing.motions[0].place];
     let text = terminal::document(&view::summary(&plan, &open, &files), 200);

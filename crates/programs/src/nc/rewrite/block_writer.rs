@@ -1,6 +1,6 @@
 //! Writes the words of one block: numbers in place, added words at their place in the word order.
 
-use super::word_slots::{ORDER, WordSlots, spaced};
+use super::word_slots::{ANGLES, ORDER, SPIN, VECTOR, WordSlots, spaced};
 use crate::edit::Edits;
 use crate::nc::dialect::Dialect;
 use crate::nc::expression::literal;
@@ -108,6 +108,18 @@ impl BlockWriter<'_, '_> {
         decimals.min(DIGITS.saturating_sub(whole))
     }
 
+    /// The decimals with which a word is written if the source has no more. A Heidenhain control takes four of a coordinate in mm or
+    /// degrees and eight of a tool vector (TNC 640, User's Manual DIN/ISO 1/2015, section 19.3); in inches one more, which is no coarser.
+    fn least_decimals(&self, place: usize, least: u8) -> u8 {
+        const COORDINATE: u8 = 4;
+        match place {
+            _ if self.dialect != Dialect::Heidenhain => least,
+            VECTOR..SPIN => least,
+            ANGLES..VECTOR => least.min(COORDINATE),
+            _ => least.min(COORDINATE + 1),
+        }
+    }
+
     /// Gives a word a value. An omitted word is added if the value in effect without it (`keep`) differs; an
     /// expression with that value already (`was`) is kept. Returns the value that the control reads.
     pub(super) fn write_word(
@@ -122,7 +134,7 @@ impl BlockWriter<'_, '_> {
         if !value.is_finite() {
             return keep;
         }
-        let least = self.fitting_decimals(value, least);
+        let least = self.fitting_decimals(value, self.least_decimals(place, least));
         let Some(word) = self.order[place] else {
             if !differs(keep, value, least) {
                 return keep;

@@ -336,7 +336,7 @@ impl Interpreter<'_, '_> {
     /// act too late.
     fn can_split(&self, block: &Block<'_>, before: &BlockContext) -> bool {
         self.word_semantics == self.state.word_semantics()
-            && !begins_something(block)
+            && !begins_something(block, self.dialect)
             && self.dialect != Dialect::Heidenhain
             && !block.flags.skippable
             && before.start.iter().all(Option::is_some)
@@ -753,9 +753,24 @@ fn arc_midpoint(
     target(arc.point_at(a, b, 0.5).map(Ok), half)
 }
 
-/// Whether a block starts the spindle, the coolant or another function: an inserted block would run without it. Stops
-/// take effect after the motion.
-fn begins_something(block: &Block<'_>) -> bool {
+/// Whether a block starts the spindle, the coolant or another function, or states a feed, an override or a limit that is
+/// not modelled: an inserted block would run without it. Stops take effect after the motion.
+fn begins_something(block: &Block<'_>, dialect: Dialect) -> bool {
+    let siemens = dialect == Dialect::Siemens;
     block.m.iter().any(|m| !matches!(m, 0..=2 | 5 | 9 | 30))
-        || block.words.iter().any(|word| word.address() == Some(b'S'))
+        || block.words.iter().any(|word| match word.address() {
+            Some(b'S') => true,
+            // Of a Siemens control an auxiliary function, elsewhere the number of a tool length.
+            Some(b'H') => siemens,
+            Some(_) => false,
+            // S1=, M1=, H1=, FB=, OVR=, ACC[X]=, FGROUP(…), $A_OUT[1]=: only names of the path itself wait for its end.
+            None => siemens && !is_path_name(&word.name.to_ascii_uppercase()),
+        })
+}
+
+/// Names of a Siemens control that state the end of a motion or its path.
+fn is_path_name(name: &[u8]) -> bool {
+    const PATH_NAMES: [&[u8]; 13] =
+        [b"A2", b"B2", b"C2", b"A3", b"B3", b"C3", b"THETA", b"CR", b"AR", b"TURN", b"I1", b"J1", b"K1"];
+    PATH_NAMES.contains(&name)
 }

@@ -189,6 +189,45 @@ fn no_block_is_inserted_before_one_that_starts_the_spindle() {
     }
 }
 
+/// The class: a Siemens block says more than where it ends. An inserted block would run without that: at another feed
+/// (FB, FZ, OVR), or before the spindle turns (M1=3).
+#[test]
+fn no_block_is_inserted_before_a_siemens_block_with_words_beyond_its_path() {
+    let insertable = |words: &str| {
+        let source = format!("{HEAD}{}X50 {words}\nG2 X60 Y2 I5 J0 {words}\n", begin(Siemens));
+        let setup = Setup { dialect: Some(Siemens), ..Setup::default() };
+        let task = Task::read(&[("x", source.as_bytes())], &setup);
+        assert!(task.listing.motions.iter().all(|motion| motion.reason().is_none()), "{source}");
+        (task.listing.motions[1].insertable, task.listing.motions[2].can_straighten)
+    };
+    for words in ["", "F200", "F=R1*2", "G9", "; FB=100", "A3=0 B3=0 C3=1 THETA=0"] {
+        assert_eq!(insertable(words), (true, true), "{words}");
+    }
+    let beyond = [
+        "FB=100",
+        "fb=100",
+        "FZ=0.1",
+        "F2=100",
+        "OVR=50",
+        "ACC[X]=50",
+        "FL[X]=50",
+        "FGROUP(X,Y)",
+        "S1=500",
+        "M1=3 S1=500",
+        "M2=3",
+        "H5",
+        "H1=5",
+        "H=QU(5)",
+        "$A_OUT[1]=1",
+        "FNORM",
+        "SOFT",
+        "R1=5",
+    ];
+    for words in beyond {
+        assert_eq!(insertable(words), (false, false), "{words}");
+    }
+}
+
 /// A control may turn the tool about one axis or run A, B and C as axes: where the two differ, no orientation is inserted.
 #[test]
 fn nothing_is_inserted_where_a_control_may_turn_the_tool_in_two_ways() {

@@ -1,11 +1,13 @@
 //! Heidenhain conversational: what single blocks preserve, and what they make unknown.
 
+use nalgebra::{Quaternion, UnitQuaternion};
 use truegrind_programs::motion::Reason::*;
 use truegrind_programs::nc::dialect::Dialect::Heidenhain;
 use truegrind_programs::nc::parser::parse;
+use truegrind_programs::rewrite::{NewTarget, RewriteOutcome};
 
 use super::default_deny::{begin, check, left};
-use super::ends;
+use super::{ends, moved, rewrite_as};
 
 /// The end points of the blocks after the first motion.
 fn after(body: &str) -> Vec<Result<[f64; 3], truegrind_programs::motion::Reason>> {
@@ -178,4 +180,29 @@ fn formulas_have_powers_remainders_and_pi() {
     }
     assert_eq!(after("Q6 = -7 % 4\nL X+Q6"), [Err(UnknownVariable)]);
     assert_eq!(after("Q6 = 7 % 0\nL X+Q6"), [Err(WrongShape)]);
+}
+
+/// The class: a word with more decimals than the control takes. It takes four of X and of A; more only where the program has more itself.
+#[test]
+fn words_of_heidenhain_have_at_most_four_decimals() {
+    let source = "BEGIN PGM P MM\n; truegrind angles wpr\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[500,0,0],[1,0,0,0]]\n\
+                  TOOL CALL 1 Z S1000\nM128\nL X+1 Y+2 Z+3 A+180 B+0 C+0 R0 F600\nL X+5.12345 A+179.123456\nL Z+4\n";
+    let (text, rewritten) = rewrite_as(source, Heidenhain, |listing| {
+        let mut changes = moved(listing, [0.123_456_789, -0.2, 0.3]);
+        for target in changes.iter_mut().flat_map(|change| &mut change.targets) {
+            if let NewTarget::Cartesian { quaternion: [w, i, j, k], .. } = target {
+                // A turn about several axes.
+                let turn = UnitQuaternion::from_euler_angles(0.001, 0.002, 0.003);
+                let turned = UnitQuaternion::from_quaternion(Quaternion::new(*w, *i, *j, *k)) * turn;
+                [*w, *i, *j, *k] = [turned.w, turned.i, turned.j, turned.k];
+            }
+        }
+        changes
+    });
+    assert!(rewritten.outcomes.iter().all(|outcome| *outcome == RewriteOutcome::InPlace), "{text}");
+    let decimals = |word: &str| word.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let longest = |line: &str| line.split(' ').map(decimals).max().unwrap();
+    let lines: Vec<&str> = text.lines().filter(|line| line.starts_with("L ")).collect();
+    assert_eq!(lines.iter().map(|line| longest(line)).collect::<Vec<_>>(), [4, 6, 4], "{text}");
+    assert!(lines[0].contains(" Y+1.8000 ") && lines[1].contains("X+5.24691"), "{text}");
 }
