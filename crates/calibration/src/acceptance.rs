@@ -4,9 +4,9 @@
 //! (five folds); or the frame is stated and nothing is fitted. The decision follows ISO 14253-1 for an expanded uncertainty
 //! U of 95.45 %, the larger of what is stated and what repeated poses scatter: accepted if largest error plus U is within the
 //! tolerance, refused if the largest error exceeds it by more than U, undecided otherwise. Where U is unknown, nothing is accepted; nor by
-//! poses that show too little of the arm ([`Tested`]). Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
-//! only if enough cycles were measured; path accuracy and repeatability (ten cycles) only from rows with a position on a
-//! path. Those rows are used for nothing else, because the arm was moving.
+//! poses that show too little of the arm ([`Tested`]), nor by cables, which see one of three coordinates of an error. Pose accuracy and
+//! repeatability (ISO 9283: thirty cycles at five poses) are computed only if enough cycles were measured; path accuracy and repeatability
+//! (ten cycles) only from rows with a position on a path. Those rows are used for nothing else, because the arm was moving.
 
 pub mod decision;
 mod error;
@@ -155,6 +155,8 @@ pub struct Acceptance {
     pub cycles: Option<Cycles>,
     /// Largest number of readings at one pose.
     pub most_cycles: usize,
+    /// Whether the sensor saw only the share of each error along a cable: that can be too large for a tolerance, but not small enough.
+    pub is_along_cables: bool,
     /// The measured paths; none for a cable, which measures no position.
     pub paths: Vec<PathFound>,
     /// How much of the measured region the poses cover.
@@ -177,13 +179,15 @@ impl Acceptance {
     }
 
     /// The decision over all stated tolerances. A model that is worse than the data sheet is not accepted, nor one by poses that show too
-    /// little of the arm; not evaluated if an orientation
-    /// tolerance is stated but no orientation was measured.
+    /// little of the arm, nor by cables, since the error across a cable may be of any size; not evaluated if an orientation tolerance is
+    /// stated but no orientation was measured.
     pub fn overall(&self) -> Decision {
         let orientation = self.orientation.as_ref().map_or(Decision::NotEvaluated, |found| found.decision);
         let decision = if self.orientation_asked { self.decision.and(orientation) } else { self.decision };
         match decision {
-            Decision::Accepted if self.is_worse_than_data_sheet() || !self.tested.is_enough() => {
+            Decision::Accepted
+                if self.is_worse_than_data_sheet() || !self.tested.is_enough() || self.is_along_cables =>
+            {
                 Decision::Open
             }
             decision => decision,
@@ -266,6 +270,7 @@ pub fn accept(
         orientation_asked: options.tolerance_rad.is_some(),
         cycles: cycles(&observed, &groups, &estimated.model, options)?,
         most_cycles: groups.iter().map(Vec::len).max().unwrap_or(0),
+        is_along_cables: dataset.sensor == Sensor::Cable,
         paths,
         coverage: Coverage::of(dataset, estimated),
         conditions: [

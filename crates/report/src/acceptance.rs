@@ -138,7 +138,11 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> PageVerdict {
         ));
     }
     if sensor == Sensor::Cable {
-        reasons.push("a cable measures errors only along itself; errors across it are not judged".to_owned());
+        reasons.push(
+            "a cable measures errors only along itself: it can show that an arm does not meet a tolerance, but not that it does, since errors \
+             across it may be larger; measure positions (tracker or camera) to accept the arm"
+                .to_owned(),
+        );
     }
     PageVerdict::new(status, headline, reasons)
 }
@@ -247,6 +251,12 @@ fn headline(found: &Acceptance) -> (Status, String) {
             Status::Warning,
             format!(
                 "Not decided: largest error {max} mm, tolerance {limit} mm, but the poses show only a small part of the arm"
+            ),
+        ),
+        Decision::Open if found.decision == Decision::Accepted && !found.is_worse_than_data_sheet() => (
+            Status::Warning,
+            format!(
+                "Not decided: largest error along the cable {max} mm, tolerance {limit} mm, but the error across it is not known"
             ),
         ),
         Decision::Open if found.decision == Decision::Accepted => (
