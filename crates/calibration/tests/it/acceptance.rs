@@ -85,7 +85,6 @@ fn the_decision_leaves_room_for_the_uncertainty() {
     assert!(matches!(accept(&other, &model, &options(-1.0)), Err(AcceptError::Length { .. })));
 }
 
-/// Without an uncertainty nothing is accepted, but an error beyond the tolerance is refused whatever the uncertainty.
 /// A cable sees one of the three coordinates of an error: an arm can miss a tolerance of its position by it, but not meet one. Simulated, arms
 /// were accepted whose largest error was 1.4 times the tolerance.
 #[test]
@@ -109,6 +108,7 @@ fn cables_refuse_an_arm_but_do_not_accept_one() {
     assert_eq!(found.overall(), Decision::Refused, "{:?}", found.model);
 }
 
+/// Without an uncertainty nothing is accepted, but an error beyond the tolerance is refused whatever the uncertainty.
 #[test]
 fn an_unknown_uncertainty_accepts_nothing() {
     let model = model(&dataset(rows(0.1, 120)));

@@ -418,10 +418,10 @@ fn a_target_that_droops_is_told_with_its_size() {
     assert!(found.estimated.model.effects.iter().all(Effect::is_zero), "it moves no program");
 }
 
-/// A bearing that lets its axis wobble: no gear, and no joint that another turns.
+/// A bearing that lets its axis wobble: no gear, no joint that another turns and, in this phase, no link that twists.
 #[test]
 fn an_axis_that_wobbles_is_told_with_its_joint_and_size() {
-    let hidden = [Hidden::Wobble { joint: 1, peak_rad: 3e-4 }];
+    let hidden = [Hidden::Wobble { joint: 1, peak_rad: 3e-4, phase: 0.6 }];
     let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 91)).dataset);
     let names: Vec<_> = identified(&found).iter().map(|f| (f.effect.as_str(), f.joints.clone())).collect();
     assert_eq!(names, [("axis-wobble", Some(vec![2]))]);
@@ -439,10 +439,25 @@ fn an_axis_that_wobbles_is_told_with_its_joint_and_size() {
     assert!(matches!(written[..], [Effect::AxisWobble(of)] if of.joint == 1), "{written:?}");
 }
 
+/// What stands beside the plane of the arm twists its upper link, which turns its end as an axis that wobbles does, in the phase that gravity gives:
+/// neither is said to be it, and no program moves for it.
+#[test]
+fn an_axis_that_tilts_in_the_phase_of_gravity_may_be_a_link_that_twists() {
+    let ur10 = robots::load("universal-robots-ur10").unwrap().model;
+    let hidden = [Hidden::Twist { joint: 1, peak_rad: 3e-4 }];
+    let rows = run(&ur10, &hidden, &setup(Sensor::Position, 300, 94)).dataset;
+    let none = &|_: &str| {};
+    let found = diagnose(&rows, "ur10", &ur10, &frames(&rows, &ur10), &Options::default(), none).unwrap();
+    assert_eq!(identified(&found), Vec::<&Finding>::new());
+    let wobble = &found.diagnosis.findings[0];
+    assert_eq!((wobble.effect.as_str(), wobble.joints.as_deref()), ("axis-wobble", Some(&[2][..])));
+    assert!(wobble.doubts.iter().any(|doubt| doubt.contains("a link that twists")), "{:?}", wobble.doubts);
+}
+
 /// Over part of a turn a tilt about the next joint's axis is what a coupling of the two does: neither is said to be it.
 #[test]
 fn over_part_of_a_turn_a_wobbling_axis_may_be_a_coupling() {
-    let hidden = [Hidden::Wobble { joint: 2, peak_rad: 3e-4 }];
+    let hidden = [Hidden::Wobble { joint: 2, peak_rad: 3e-4, phase: 0.0 }];
     let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 91)).dataset);
     assert!(identified(&found).is_empty());
     let names: Vec<&str> = found.diagnosis.findings[0].members.iter().map(|m| m.effect.as_str()).collect();
@@ -554,7 +569,7 @@ fn angles_that_are_counted_the_other_way_round_are_no_other_faults() {
 fn what_the_written_arm_lacks_of_the_arm_is_in_its_error_beside_a_droop() {
     let mut left_out = 0;
     for seed in [95, 96, 97, 98] {
-        let hidden = [Hidden::Wobble { joint: 2, peak_rad: 3e-4 }, Hidden::Droop { mm: 0.06 }];
+        let hidden = [Hidden::Wobble { joint: 2, peak_rad: 3e-4, phase: 0.0 }, Hidden::Droop { mm: 0.06 }];
         let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 120, seed)).dataset);
         let notes = &found.diagnosis.notes;
         let is_left_out =

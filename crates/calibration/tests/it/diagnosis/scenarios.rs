@@ -327,6 +327,7 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         | Hidden::Range { .. }
         | Hidden::Depth { .. }
         | Hidden::Droop { .. }
+        | Hidden::Twist { .. }
         | Hidden::Reversal { .. }
         | Hidden::Lens { .. }
         | Hidden::Tilt { .. }

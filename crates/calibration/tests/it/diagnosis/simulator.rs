@@ -51,6 +51,12 @@ pub enum Hidden {
         joint: usize,
         mm: f64,
     },
+    /// The end of the link from this joint to the next tilts under the moment of what stands beside its plane, about no axis more than about
+    /// another: by this where it tilts most.
+    Twist {
+        joint: usize,
+        peak_rad: f64,
+    },
     /// A joint stands off by this in all rows up to one.
     LostCounts {
         joint: usize,
@@ -73,6 +79,8 @@ pub enum Hidden {
     Wobble {
         joint: usize,
         peak_rad: f64,
+        /// Of the joint, where the tilt is about x.
+        phase: f64,
     },
     /// A tracker reads distances too long by this.
     Range {
@@ -153,6 +161,7 @@ impl Hidden {
         match self {
             Hidden::Compliance { .. } => "joint-compliance",
             Hidden::Bending { .. } => "link-bending",
+            Hidden::Twist { .. } => "link-twist",
             Hidden::LostCounts { .. } => "joint-zero-shift",
             Hidden::Range { .. } => "sensor-range",
             Hidden::Droop { .. } => "target-droop",
@@ -183,6 +192,7 @@ impl Hidden {
     pub fn joints(&self) -> Option<Vec<usize>> {
         match self {
             Hidden::Compliance { joint, .. }
+            | Hidden::Twist { joint, .. }
             | Hidden::Bending { joint, .. }
             | Hidden::LostCounts { joint, .. }
             | Hidden::Gear { joint, .. }
@@ -299,6 +309,19 @@ impl Arm {
         up[joint] += h;
         down[joint] -= h;
         -(self.energy(&up, flange_kg) - self.energy(&down, flange_kg)) / (2.0 * h)
+    }
+
+    /// Moment (N m) about the end of the link from a joint to the next, of all that hangs beyond, without the part about the next axis.
+    fn moment_beside(&self, u: &[f64; 6], joint: usize) -> Vector3<f64> {
+        let frames = self.frames(u);
+        let end = frames[joint + 1];
+        let (origin, axis) = (end.column(3).xyz(), end.column(2).xyz());
+        let mut moment = Vector3::zeros();
+        for (k, (mass, centre)) in self.masses.iter().enumerate().skip(joint + 1) {
+            let at = (frames[k + 1] * Vector4::new(centre.x, centre.y, centre.z, 1.0)).xyz();
+            moment += (at - origin).cross(&(self.up * (-9.81e-3 * mass)));
+        }
+        moment - axis * axis.dot(&moment)
     }
 
     /// What overturns the arm's pedestal (N m): by how much the energy falls while the whole arm turns about each axis of the base.
@@ -427,6 +450,10 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                 .iter()
                 .map(|q| arm.torque(&(arm.joint_map * q).into(), *joint, 0.0).abs())
                 .fold(1e-9, f64::max),
+            Hidden::Twist { joint, .. } => poses
+                .iter()
+                .map(|q| arm.moment_beside(&(arm.joint_map * q).into(), *joint).norm())
+                .fold(1e-9, f64::max),
             Hidden::Bending { joint, .. } => poses
                 .iter()
                 .map(|q| arm.elastic_curve(&(arm.joint_map * q).into(), *joint).0.norm())
@@ -533,15 +560,20 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     at += (sag + turn.cross(&beyond)) * (mm / peaks[k]);
                 }
             }
-            for (_, h) in hidden.iter().enumerate().filter(|(k, _)| Some(*k) != skip) {
+            for (k, h) in hidden.iter().enumerate().filter(|(k, _)| Some(*k) != skip) {
                 match h {
+                    Hidden::Twist { joint, peak_rad } => {
+                        let end = frames[joint + 1].column(3).xyz();
+                        let turn = arm.moment_beside(&u, *joint) * (peak_rad / peaks[k]);
+                        at = end + nalgebra::Rotation3::new(turn) * (at - end);
+                    }
                     Hidden::Droop { mm } => {
                         let pole = (frames[6] * grown.flange).column(2).xyz();
                         at -= (arm.up - pole * pole.dot(&arm.up)) * *mm;
                     }
-                    Hidden::Wobble { joint, peak_rad } => {
+                    Hidden::Wobble { joint, peak_rad, phase } => {
                         let [x, y, _, centre] = [0, 1, 2, 3].map(|k| frames[*joint].column(k).xyz());
-                        let (s, c) = (2.0 * u[*joint]).sin_cos();
+                        let (s, c) = (2.0 * (u[*joint] - phase)).sin_cos();
                         let tilt = nalgebra::Rotation3::new((x * c + y * s) * *peak_rad);
                         at = centre + tilt * (at - centre);
                     }
