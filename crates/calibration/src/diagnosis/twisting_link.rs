@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
 
-/// Cosine of two directions from which they count as parallel, and sine up to which as across.
+/// Cosine from which two directions count as parallel, and sine from which as across each other.
 const PARALLEL: f64 = 0.99;
 
 /// Share of a wobble that may have another phase: one that has any phase is taken for a twist in a fifth of all cases.
