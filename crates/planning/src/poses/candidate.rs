@@ -15,6 +15,7 @@ use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Joints;
 use truegrind_calibration::identification::calibration::Frames;
 use truegrind_calibration::measurement::dataset::{Row, Sensor};
+use truegrind_math::work::checkpoint;
 
 /// Constraints on poses.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,6 +116,7 @@ pub fn draw(
     let checker = CollisionChecker::of(setup, &bounds.space);
     let anchors = if setup.sensor == Sensor::Cable { setup.frames.outlets_mm.len() } else { 1 };
     while out.len() < count && rejections.drawn < DRAWS_PER_CANDIDATE * count.max(20) {
+        checkpoint();
         rejections.drawn += 1;
         let joints = Joints::from_fn(|i, _| {
             let (low, high) = (limits.min_rad[i] + bounds.margin_rad, limits.max_rad[i] - bounds.margin_rad);
