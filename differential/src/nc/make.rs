@@ -69,6 +69,9 @@ pub fn setting(seed: u64, control: Control, case: &Case) -> Setting {
 /// From this seed on some programs go to where the arm hardly reaches. Those before are what they always were.
 const BORDERS: u64 = 2_000_000;
 
+/// From this seed on one program in three states no increments.
+const INCREMENTS: u64 = 246_400_000;
+
 /// A place before the arm about which it reaches with tools that point down (mm).
 fn reached(case: &Case) -> [f64; 3] {
     let links = &case.arm.nominal;
@@ -122,6 +125,19 @@ pub fn program(seed: u64, control: Control, setting: &Setting, features: Feature
     };
     let mut text = lines.join("\n");
     text.push('\n');
+    // Programs without increments, in which the places after a shift are known.
+    if seed >= INCREMENTS && seed % 3 == 0 {
+        for (increment, absolute) in [
+            ("G91\n", "G90\n"),
+            ("G91 ", "G90 "),
+            ("=IC(", "=AC("),
+            (" IX", " X"),
+            (" IY", " Y"),
+            (" IZ", " Z"),
+        ] {
+            text = text.replace(increment, absolute);
+        }
+    }
     if maker.chance(0.1) { text.replace('\n', "\r\n") } else { text }
 }
 

@@ -136,6 +136,7 @@ impl Task<'_> {
                     rewriter.control = ControlState { straightened, shift_change, ..ControlState::default() };
                 }
                 StateEvent::AxesUnknown(axes) => rewriter.control.invalidate_axes(axes),
+                StateEvent::FrameMoved(by_mm) => rewriter.control.move_frame(by_mm),
                 StateEvent::OriginSet { stated, .. } => rewriter.control.set_origin(stated),
                 StateEvent::ShiftStated(axes) => rewriter.control.shift_stated(axes),
                 // No position changes there: the motions that end there are refused.

@@ -107,12 +107,14 @@ impl<'s> Task<'s> {
             contexts: Vec::new(),
         };
         let mut call_edges = CallEdges::default();
+        let may_increment = task.trees.iter().zip(&task.dialects).any(|(tree, d)| may_increment(tree, *d));
         for file in 0..files.len() {
             let mut interpreter =
                 Interpreter::new(&task.trees[file], file as u32, task.dialects[file], setup);
             // Siemens: the extension of a subprogram.
             interpreter.scan.is_subprogram = task.names[file].to_ascii_lowercase().ends_with(".spf");
             interpreter.is_called = setup.is_called(&task.names[file]);
+            interpreter.may_increment = may_increment || interpreter.is_called;
             interpreter.files = files.len();
             interpreter.listing = std::mem::take(&mut task.listing);
             interpreter.events = std::mem::take(&mut task.events);
@@ -201,6 +203,8 @@ pub(super) struct Interpreter<'t, 's> {
     files: usize,
     /// Whether a program outside these files calls this one.
     is_called: bool,
+    /// Whether a word may be an increment, in these files or in one that calls them.
+    may_increment: bool,
     pass: Pass,
     /// Variables that the file has assigned so far.
     assigned_variables: HashSet<Variable>,
@@ -317,6 +321,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             returns_are_common: false,
             files: 1,
             is_called: false,
+            may_increment: false,
             pass: Pass::default(),
             assigned_variables: HashSet::new(),
             block: None,
@@ -717,6 +722,29 @@ const ORIENTATION: u8 = 7 << 3;
 /// A G code in tenths: 540 for G54, 434 for G43.4.
 fn code(number: f64) -> u32 {
     (number * 10.0).round().clamp(0.0, 1e6) as u32
+}
+
+/// Whether a word of a file may be an increment: G91, a G code that is computed, IC( ), IX of Heidenhain.
+fn may_increment(tree: &NcTree<'_>, dialect: Dialect) -> bool {
+    let mut tokens =
+        (0..tree.len() as u32).filter(|token| tree.kind(*token) != Some(Token::Space)).peekable();
+    while let Some(token) = tokens.next() {
+        let name = tree.text(token).to_ascii_uppercase();
+        let may = match (dialect, &*name) {
+            (_, b"G") => tokens.peek().is_some_and(|code| {
+                let number =
+                    std::str::from_utf8(tree.text(*code)).ok().and_then(|text| text.parse::<f64>().ok());
+                number.is_none_or(|number| number == 91.0)
+            }),
+            (Dialect::Siemens, b"IC") => true,
+            (Dialect::Heidenhain, [b'I', _] | [b'I', b'P', _]) => true,
+            _ => false,
+        };
+        if may {
+            return true;
+        }
+    }
+    false
 }
 
 /// Whether a file takes over or cancels the length of a tool (G43, G43.1, G43.2, G49).

@@ -34,6 +34,14 @@ impl ControlState {
         }
     }
 
+    pub(super) fn move_frame(&mut self, by_mm: [f64; 3]) {
+        for (axis, by_mm) in by_mm.into_iter().enumerate() {
+            for position in [&mut self.position[axis], &mut self.intended[axis]].into_iter().flatten() {
+                *position += by_mm;
+            }
+        }
+    }
+
     pub(super) fn shift_stated(&mut self, axes: [bool; 3]) {
         for (shift_change, _) in self.shift_change.iter_mut().zip(axes).filter(|(_, placed)| *placed) {
             *shift_change = 0.0;

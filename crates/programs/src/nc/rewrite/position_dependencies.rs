@@ -185,7 +185,10 @@ impl FileDependencies {
                 self.origin.iter_mut().for_each(|origin| origin.origins = true);
             }
             StateEvent::PoseUnknown => self.mix_axes(),
-            StateEvent::FileStart | StateEvent::AxesUnknown(_) | StateEvent::Motion(_) => {}
+            StateEvent::FileStart
+            | StateEvent::AxesUnknown(_)
+            | StateEvent::FrameMoved(_)
+            | StateEvent::Motion(_) => {}
         }
     }
 

@@ -12,6 +12,8 @@ pub(crate) enum StateEvent {
     Motion(u32),
     /// These axes are unknown from here on: bits 0 to 2 X Y Z, 3 to 5 A B C.
     AxesUnknown(u8),
+    /// Every position has coordinates that are larger by this (mm): the frame is another, of the same directions.
+    FrameMoved([f64; 3]),
     /// Position and orientation are unknown from here on.
     PoseUnknown,
     /// The tool position is given these coordinates (G92).

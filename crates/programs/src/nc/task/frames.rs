@@ -9,7 +9,7 @@ use super::super::orientation::Angles;
 use super::super::setup::{self, flange_tool};
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
-use super::{Block, Interpreter};
+use super::{Block, Interpreter, StateEvent};
 use crate::motion::{Frame, Reason, Tool, WorkObject, WorkObjectValue, intern};
 use truegrind_math::se3::Pose;
 
@@ -42,7 +42,6 @@ impl Interpreter<'_, '_> {
             self.state.programmable_frame = None;
             self.state.groups.set_value(ModalGroup::ProgrammableFrame, 0);
         }
-        self.invalidate_position();
         let stated = block.has_motion_words() || block.words.iter().any(|word| word.is("RPL"));
         let pose = self.programmed_frame(block, &name, stated);
         match pose {
@@ -57,8 +56,27 @@ impl Interpreter<'_, '_> {
         let same = rotation(&before).angle_to(&rotation(&self.state.programmable_frame)) < 1e-9;
         if !same || was || unsupported(&self.state) {
             self.invalidate_pose();
+        } else {
+            self.displace_frame((!unknown).then_some(before));
         }
         true
+    }
+
+    /// The programmable frame was this and has been displaced without a turn: the arm stands where it stood, at other coordinates. They
+    /// are unknown if the frame was. Where an increment begins after that, there or at the same coordinate in the new frame, is a setting of the
+    /// control (840D: SD42440), and words that restate the place would decide it: a program with increments keeps its coordinates unknown.
+    pub(super) fn displace_frame(&mut self, before: Option<Option<Pose>>) {
+        let Some(before) = before.filter(|_| !self.is_conditional() && !self.may_increment) else {
+            self.invalidate_position();
+            return;
+        };
+        let [before, after] =
+            [before, self.state.programmable_frame].map(|frame| frame.unwrap_or_else(Pose::identity));
+        let moved = after.rotation.inverse() * (before.translation.vector - after.translation.vector);
+        for (axis, position) in self.state.position.iter_mut().enumerate() {
+            *position = position.map(|position| position + moved[axis]);
+        }
+        self.events.push(StateEvent::FrameMoved(moved.into()));
     }
 
     /// The frame of such a block; `None` where it is unknown or no rigid motion. `stated`: whether the block has values.

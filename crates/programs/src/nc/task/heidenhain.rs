@@ -218,6 +218,7 @@ impl<'s> Interpreter<'_, 's> {
             (b"FUNCTION", b"MODE") => return words[2..] == [b"MILL"],
             (b"FUNCTION", b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
             (b"TRANS", b"DATUM") => self.without_moving(|this| {
+                let before = this.known_datum_shift();
                 match third {
                     Some(b"RESET") => {
                         this.set_datum_shift([Some(0.0); 3]);
@@ -226,7 +227,7 @@ impl<'s> Interpreter<'_, 's> {
                     Some(b"AXIS") => this.datum_shift(&words[3..]),
                     _ => this.set_datum_shift([None; 3]),
                 }
-                this.invalidate_position();
+                this.displace_datum(before);
             }),
             (b"TRANS", b"MIRROR") => self.switch_transform(ModalGroup::Mirror, on),
             (b"TRANS", b"ROTATION") => self.switch_transform(ModalGroup::Rotation, on),
@@ -371,8 +372,9 @@ impl<'s> Interpreter<'_, 's> {
         match number {
             b"7" => {
                 self.without_moving(|this| {
+                    let before = this.known_datum_shift();
                     this.datum_shift(values);
-                    this.invalidate_position();
+                    this.displace_datum(before);
                 });
             }
             // The title starts the definition; the lines after it hold the values.
@@ -470,6 +472,20 @@ impl<'s> Interpreter<'_, 's> {
             }
         }
         self.set_datum_shift(shift);
+    }
+
+    /// The frame of the datum shift, if all of it is known.
+    fn known_datum_shift(&self) -> Option<Option<Pose>> {
+        let groups = [ModalGroup::DatumShift, ModalGroup::RotaryOffset, ModalGroup::ProgrammableFrame];
+        let known = |group: &ModalGroup| self.state.unknown_reason(group.bit()).is_none();
+        let rigid = groups[..2].iter().all(|group| !self.state.groups.is_on(*group));
+        (rigid && groups.iter().all(known)).then_some(self.state.programmable_frame)
+    }
+
+    /// Follows a datum shift that was `before`: the arm stands where it stood.
+    fn displace_datum(&mut self, before: Option<Option<Pose>>) {
+        let before = before.filter(|_| self.known_datum_shift().is_some());
+        self.displace_frame(before);
     }
 
     /// Sets the datum shift, as far as it is known.

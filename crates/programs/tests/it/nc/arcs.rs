@@ -156,14 +156,16 @@ fn an_arc_after_unmodified_motions_keeps_its_start() {
     check(
         Siemens,
         &[
-            ("X10\nX20\nTRANS\nZ45\nG2 X30 Y0 I5 J0", &[None, before, unknown, unknown]),
+            // A turned frame leaves no axis where it was.
+            ("X10\nX20\nROT Z5\nZ45\nG2 X30 Y0 I5 J0", &[None, before, unknown, unknown]),
+            ("X10\nX20\nTRANS X1\nZ45\nG2 X29 Y2 I5 J0", &[None, None, None, None]),
             // Y is relative to the end of the motion before the change of frame, through everything between.
             (
-                "X10\nX20\nTRANS\nX5 Y=IC(1) Z30\nX7\nX8 Z9\nG3 X9 Y2 I0 J1",
+                "X10\nX20\nTRANS Y1\nX5 Y=IC(1) Z30\nX7\nX8 Z9\nG3 X9 Y2 I0 J1",
                 &[None, before, unknown, unknown, unknown, unknown],
             ),
             (
-                "X10\nX20\nTRANS\nX5 Y=AC(1) Z30\nX7\nX8 Z9\nG3 X9 Y2 I0 J1",
+                "X10\nX20\nTRANS Y1\nX5 Y=AC(1) Z30\nX7\nX8 Z9\nG3 X9 Y2 I0 J1",
                 &[None, None, None, None, None, None],
             ),
         ],

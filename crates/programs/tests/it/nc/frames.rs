@@ -1,10 +1,12 @@
 //! Work offsets, shifts and tools, as each control treats them.
 
 use truegrind_programs::motion::Reason::*;
+use truegrind_programs::nc::Task;
 use truegrind_programs::nc::dialect::Dialect::{Fanuc, Heidenhain, Iso, LinuxCnc, Siemens};
+use truegrind_programs::nc::setup::Setup;
 
-use super::default_deny::{F, G, S, begin, check, left, reasons};
-use super::{ends, listing_of};
+use super::default_deny::{F, G, HEAD, S, begin, check, left, reasons};
+use super::{change_of, ends, listing_of, moved, rewrite_as};
 
 const L: &str = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
 
@@ -131,9 +133,61 @@ fn a_shift_rotates_nothing() {
         &[
             ("CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+10\nL X+10 Y+0 Z+50", &[None]),
             ("TRANS DATUM AXIS X+10\nL X+10 Y+0 Z+50\nTRANS DATUM RESET\nL X+10 Y+0 Z+50", &[None, None]),
-            ("CYCL DEF 7.1 X+10\nL X+10", &[left(PositionUnknown)]),
+            ("CYCL DEF 7.1 #5\nL X+10", &[left(Transformed)]),
         ],
     );
+}
+
+/// The class: after a shift a block states some axes. The others stand where they stood. Whether an increment begins there or at the
+/// same coordinate in the shifted frame is a setting of the control, so nothing is known in a program with increments.
+#[test]
+fn axes_that_a_block_omits_after_a_shift_stand_where_they_stood() {
+    let cases = [
+        (Siemens, "X10 Y2 Z50\nTRANS X5 Y4\nX0\n", [0.0, -2.0, 50.0]),
+        (Siemens, "X10 Y2 Z50\nTRANS X5\nATRANS X1 Y4\nZ7\n", [4.0, -2.0, 7.0]),
+        (Siemens, "TRANS X5\nX10 Y2 Z50\nTRANS\nY1\n", [15.0, 1.0, 50.0]),
+        (Siemens, "ROT Z90\nX10 Y2 Z50 A=180 B=0 C=0\nATRANS X5\nZ1\n", [5.0, 2.0, 1.0]),
+        (
+            Heidenhain,
+            "L X+10 Y+2 Z+50\nCYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+5\nCYCL DEF 7.2 Y+4\nL X+0\n",
+            [0.0, -2.0, 50.0],
+        ),
+        (Heidenhain, "L X+10 Y+2 Z+50\nTRANS DATUM AXIS Z+7\nL X+0\n", [0.0, 2.0, 43.0]),
+        (Heidenhain, "TRANS DATUM AXIS Z+7\nL X+10 Y+2 Z+43\nTRANS DATUM RESET\nL X+1\n", [1.0, 2.0, 50.0]),
+    ];
+    for (dialect, body, expected) in cases {
+        let source = format!("{HEAD}{}{body}", begin(dialect));
+        let setup = Setup { dialect: Some(dialect), ..Setup::default() };
+        let task = Task::read(&[("x", source.as_bytes())], &setup);
+        let end = task.listing.motions.last().unwrap().to().unwrap().value.unwrap();
+        let off = |axis: usize| (end.cartesian().unwrap().position_mm[axis] - expected[axis]).abs();
+        assert!((0..3).all(|axis| off(axis) < 1e-9), "{body}: {end:?}");
+    }
+    let unknown = left(PositionUnknown);
+    check(
+        Siemens,
+        &[
+            ("TRANS X5\nX=IC(1)\nX7", &[unknown, unknown]),
+            ("TRANS X5\nY5\nX7 Z1\nX1\nG91 X1\nG90", &[unknown, None, None, None]),
+        ],
+    );
+    check(Heidenhain, &[("CYCL DEF 7.1 X+10\nL X+5\nL IX+1", &[unknown, unknown])]);
+    // On one of two ways the frame is another.
+    assert!(reasons(Siemens, "IF R1>0\nTRANS X5\nENDIF\nTRANS X1\nY5")[0].is_some());
+}
+
+/// The words of a motion behind a shift are those that the corrected motion before it leaves in effect.
+#[test]
+fn words_behind_a_shift_continue_from_the_corrected_end() {
+    let source = format!("{HEAD}{}X10 Z50\nTRANS X5 Y5\nX0 Y0\nZ0\n", begin(Siemens));
+    let lines = |text: &str| -> Vec<String> { text.lines().rev().take(4).map(str::to_owned).collect() };
+    let (text, _) = rewrite_as(&source, Siemens, |listing| moved(listing, [0.25, 0.5, 1.0]));
+    let all = lines(&text);
+    assert!(all[3].starts_with("X10.25") && all[3].contains("Z51"), "{text}");
+    assert!(all[1].starts_with("X0.25") && all[1].contains("Y0.5") && !all[1].contains('Z'), "{text}");
+    // The motion behind the shift is not corrected: it restates what the corrected one has changed.
+    let (text, _) = rewrite_as(&source, Siemens, |listing| vec![change_of(listing, 1, [0.0, 0.0, 1.0])]);
+    assert_eq!(lines(&text)[1], "X0 Y0 Z50.0000", "{text}");
 }
 
 #[test]
