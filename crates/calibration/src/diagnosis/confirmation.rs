@@ -113,10 +113,16 @@ impl Confirmation {
                 "not significant once smooth unmodelled trends in time and pose are allowed for".to_owned(),
             );
         } else if self.margin < CLEAR_TWICE_LOG_BF {
-            out.push(format!(
-                "with smooth unmodelled trends allowed for, a rival is nearly as probable: twice the log Bayes factor {:.1}",
-                self.margin
-            ));
+            // The margin is twice the logarithm of the Bayes factor.
+            let times = match (0.5 * self.margin.abs()).exp() {
+                times if times < 1000.0 => format!("{times:.1}"),
+                _ => "over 1000".to_owned(),
+            };
+            out.push(if self.margin >= 0.0 {
+                format!("with smooth unmodelled trends allowed for, it is only {times} times as probable as a rival")
+            } else {
+                format!("with smooth unmodelled trends allowed for, a rival is {times} times as probable")
+            });
         }
         if self.testable < MIN_TESTABLE_HALVES {
             out.push(format!(

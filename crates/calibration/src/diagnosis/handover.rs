@@ -516,6 +516,7 @@ fn judge(case: &Judged<'_>) -> Verdict {
     if let Some(unseen_target) = &case.unseen_target {
         verdict.note(unseen_target.clone());
     }
+    verdict.check_mastering(case.parameters, &case.options.arm_tolerance);
     verdict.check_limits(&case.options.limits, &with_causes.random);
     verdict.build()
 }

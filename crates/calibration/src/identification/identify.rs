@@ -778,6 +778,7 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
         verdict.check_benefit(benefit, case.sensor);
     }
     let limits = Limits { rmse_mm: options.limit_rmse_mm, max_mm: options.limit_max_mm };
+    verdict.check_mastering(case.parameters, &options.tolerance);
     verdict.check_limits(&limits, &case.trained.geometry.held_out);
     verdict.build()
 }

@@ -84,6 +84,35 @@ fn implausible_links_are_one_reason() {
     }
 }
 
+/// A joint that was mastered a degree off makes no bad fit, and its owner should know.
+#[test]
+fn a_zero_beyond_manufacture_is_a_matter_of_mastering() {
+    let off = |degrees: f64, sigma_deg: f64, name: &str| {
+        let parameter = EstimatedParameter {
+            name: name.to_owned(),
+            unit: "rad".to_owned(),
+            nominal: 0.5,
+            value: 0.5 + degrees.to_radians(),
+            sigma: sigma_deg.to_radians(),
+            prior_sigma: None,
+            determined: 0.99,
+        };
+        let mut verdict = VerdictBuilder::default();
+        verdict.check_links(std::slice::from_ref(&parameter), &Tolerance::default(), 0.0);
+        verdict.check_mastering(&[parameter], &Tolerance::default());
+        verdict.build()
+    };
+    let verdict = off(-1.5, 0.01, "link3.theta");
+    assert_eq!(verdict.status, Judgement::NotEvaluated);
+    assert!(verdict.reasons[0].text.contains("(joint 3 by -1.50°): the mastering"), "{:?}", verdict.reasons);
+    assert!(off(-0.5, 0.01, "link3.theta").reasons.is_empty());
+    assert!(off(1.0, 0.2, "link3.theta").reasons.is_empty(), "not known well enough");
+    assert!(off(1.5, 0.01, "link3.alpha").reasons.is_empty());
+    // Farther still it is a wrong robot or a wrong unit.
+    let verdict = off(30.0, 0.01, "link3.theta");
+    assert_eq!((verdict.status, verdict.reasons.len()), (Judgement::Fail, 1));
+}
+
 /// An error that nobody measured is no good error: a held-out set without rows, an error that is not a number.
 #[test]
 fn an_unknown_held_out_error_does_not_pass() {
