@@ -136,7 +136,9 @@ pub enum CellError {
         found: String,
     },
     /// Joints at the start that are no angles in degrees.
-    #[error("start_deg = {found}: expected six joint angles in degrees")]
+    #[error(
+        "start_deg = {found}: expected six joint angles in degrees (multiply radians by 57.3; whole degrees do)"
+    )]
     Start {
         /// The numbers found.
         found: String,
@@ -398,9 +400,7 @@ impl Cell {
         if let Some(found) = cell.control.as_ref().filter(|word| Dialect::stated(word).is_none()) {
             return Err(CellError::Control { found: found.clone() });
         }
-        if let Some(found) =
-            cell.start_deg.filter(|start| !start.iter().all(|q| q.abs() <= setup::MAX_JOINT_DEG))
-        {
+        if let Some(found) = cell.start_deg.filter(|start| !setup::may_be_degrees(start)) {
             return Err(CellError::Start { found: format!("{found:?}") });
         }
         for (kind, frames) in [(FrameKind::Tool, &cell.tool), (FrameKind::Wobj, &cell.wobj)] {

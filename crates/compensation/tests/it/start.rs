@@ -189,6 +189,8 @@ fn joints_that_the_arm_cannot_have_are_refused() {
         "{found:?}"
     );
     assert!(contradictions(&listing, &started([0.0, 0.0, 50.0, 0.0, 90.0, 0.0]), &nominal).is_empty());
+    let radians = Cell::from_toml("start_deg = [0, 0.1745, 0, 0, 1.5708, 0]\n").unwrap_err();
+    assert!(radians.to_string().contains("multiply radians by 57.3"), "{radians}");
     let wrong = Cell::from_toml("start_deg = [0, 0, inf, 0, 90, 0]\n").unwrap_err();
     assert!(matches!(wrong, CellError::Start { .. }), "{wrong}");
     let cell = Cell::from_toml("start_deg = [0, 0, 10, 0, 90, 0]\n").unwrap();

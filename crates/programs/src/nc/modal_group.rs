@@ -60,7 +60,7 @@ pub(super) enum ModalGroup {
     FixtureOffset,
     /// TRANS DATUM TABLE, cycle 7 with a row of the table.
     DatumShift,
-    /// Cycle 26: one scale for each axis.
+    /// Cycle 26: one scale for each axis. TRAILON of Siemens: an axis follows another by a factor.
     AxisScaling,
     /// Offsets of A, B, C (G92 A0).
     RotaryOffset,

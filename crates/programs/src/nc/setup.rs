@@ -107,6 +107,25 @@ pub(super) fn stated_control(source: &[u8]) -> Option<Dialect> {
 /// Largest plausible joint angle (°).
 pub const MAX_JOINT_DEG: f64 = 3600.0;
 
+/// Whether joints at which an arm starts may be degrees. All within a turn in radians and with decimals they are radians: a start is stated
+/// roughly, and for one in degrees so near to zero whole degrees do.
+///
+/// ```
+/// use truegrind_programs::nc::setup::may_be_degrees;
+///
+/// assert!(may_be_degrees(&[0.0, 10.5, -5.0, 0.0, 85.0, 180.0]) && may_be_degrees(&[0.0, 0.0, 0.0, 0.0, 5.0, 0.0]));
+/// assert!(!may_be_degrees(&[0.0, 0.17, -0.09, 0.0, 1.48, 3.14]));
+/// ```
+pub fn may_be_degrees(joints: &[f64; 6]) -> bool {
+    let largest = joints.iter().map(|angle| angle.abs()).fold(0.0, f64::max);
+    let looks_like_radians = largest > SMALL_DEG && largest <= std::f64::consts::TAU;
+    let are_whole = joints.iter().all(|angle| angle.fract() == 0.0);
+    joints.iter().all(|angle| angle.abs() <= MAX_JOINT_DEG) && (are_whole || !looks_like_radians)
+}
+
+/// Below this an angle in degrees or in radians is about zero.
+const SMALL_DEG: f64 = 0.3;
+
 /// Parses a comment as a statement of a frame, tool, convention or start; the error is what was expected.
 pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
     // Fast exit for nearly every comment.
@@ -135,9 +154,9 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
     }
     if what == "start" {
         let (_, list) = text.split_at(text.find('[').unwrap_or(text.len()));
-        let near = |joints: &[f64; 6]| joints.iter().all(|angle| angle.abs() <= MAX_JOINT_DEG);
-        return numbers(list).filter(near).map(|joints| Some(Statement::Start(joints))).ok_or_else(|| {
-            "`truegrind start [q1,q2,q3,q4,q5,q6]`: the joints in which the arm starts, in degrees".to_owned()
+        return numbers(list).filter(may_be_degrees).map(|joints| Some(Statement::Start(joints))).ok_or_else(|| {
+            "`truegrind start [q1,q2,q3,q4,q5,q6]`: the joints in which the arm starts, in degrees (multiply radians by 57.3; whole degrees do)"
+                .to_owned()
         });
     }
     if !matches!(&*what, "tool" | "frame") {

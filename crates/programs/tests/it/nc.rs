@@ -609,6 +609,7 @@ fn a_comment_states_the_start_once() {
         ("(truegrind start [0,10.5,-5,0,85])", "in degrees"),
         ("(truegrind start [0,10.5,-5,0,85,nan])", "in degrees"),
         ("(truegrind start [0,10.5,-5,0,85,3601])", "in degrees"),
+        ("(truegrind start [0,0.18,-0.09,0,1.48,3.14])", "multiply radians by 57.3"),
         ("(truegrind start)", "in degrees"),
         ("(truegrind stat [0,10.5,-5,0,85,180])", "`truegrind start …`"),
         ("(truegrind start [0,0,0,0,0,0])\n(truegrind start [0,0,0,0,90,0])", "the arm starts once"),

@@ -42,6 +42,9 @@ impl Interpreter<'_, '_> {
                     self.swivel_cycle(block, &word);
                     done = true;
                 }
+                WordValue::Arguments { first, .. } if name == b"TRAILON" => {
+                    self.couple_axis(self.tree.text(first + 1));
+                }
                 WordValue::Arguments { .. } if is_harmless_call(&name) => {}
                 _ if is_measuring_cycle(&name) => {
                     self.list_left(block, &String::from_utf8_lossy(&name), Reason::Probe);
@@ -140,6 +143,15 @@ impl Interpreter<'_, '_> {
             _ => return false,
         }
         true
+    }
+
+    /// `TRAILON(X,Y,1)` lets an axis follow another. Beside the arm that moves nothing of ours (`TRAILON(U,X)`); an axis of the arm then leaves the
+    /// programmed path. Several may follow, so TRAILOF ends nothing for certain.
+    fn couple_axis(&mut self, axis: &[u8]) {
+        if !matches!(axis.to_ascii_uppercase()[..], [b'U' | b'V' | b'W' | b'S', ..]) {
+            self.mark_position_used(super::EVERYWHERE);
+            self.switch_transform(ModalGroup::AxisScaling, true);
+        }
     }
 
     /// `CYCLE800(…)` tilts the plane; with empty brackets it cancels the tilt.

@@ -190,6 +190,22 @@ fn words_behind_a_shift_continue_from_the_corrected_end() {
     assert_eq!(lines(&text)[1], "X0 Y0 Z50.0000", "{text}");
 }
 
+/// An axis that follows another leaves the programmed path. One beside the arm may.
+#[test]
+fn motions_with_a_coupled_axis_are_left() {
+    let coupled = left(Transformed);
+    check(
+        Siemens,
+        &[
+            (
+                "X10 Y2\nTRAILON(X,Y,1)\nX1 Y2 Z3 A=180 B=0 C=0\nTRAILOF(X,Y)\nX1 Y2 Z3 A=180 B=0 C=0",
+                &[None, coupled, coupled],
+            ),
+            ("TRAILON(U,Y,1)\nX1\nTRAILOF(U,Y)\nX2", &[None, None]),
+        ],
+    );
+}
+
 #[test]
 fn cancelling_an_inactive_transform_changes_nothing() {
     for code in ["G69", "G15", "G13.1", "G50", "G50.1 X0.", "G7.1 C0."] {
