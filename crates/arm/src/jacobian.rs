@@ -60,15 +60,16 @@ pub fn joint_jacobian(
 
 /// Twists of a point for the rotation of each joint, with the motions of links that follow it.
 fn rotation_twists(frames: &Chain<f64>, moved: &[MovedLinks], point: &[f64; 3]) -> Matrix6<f64> {
-    let mut out = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|joint| {
-        link_twist(frames, joint, LinkCoordinate::Theta, point)
-    }));
-    for MovedLinks { first, motion, by_rotation, .. } in moved {
+    // Moved after it has turned, what a joint carries turns about its moved axis: moved by each of several in turn.
+    let mut axes: [_; 6] = std::array::from_fn(|joint| (frames.z[joint], frames.origin[joint]));
+    for MovedLinks { first, motion, .. } in moved {
         if let Some(joint) = first.checked_sub(1) {
-            // Moved after it has turned, what a joint carries turns about its moved axis.
-            let (axis, through) = (motion.turned(&frames.z[joint]), motion.moved(&frames.origin[joint]));
-            out.set_column(joint, &turning(&axis, &through, point));
+            let (axis, through) = axes[joint];
+            axes[joint] = (motion.turned(&axis), motion.moved(&through));
         }
+    }
+    let mut out = Matrix6::from_columns(&axes.map(|(axis, through)| turning(&axis, &through, point)));
+    for MovedLinks { motion, by_rotation, .. } in moved {
         for (mut column, change) in out.column_iter_mut().zip(by_rotation) {
             column += motion.twist_vector(change, point);
         }
