@@ -354,8 +354,27 @@ impl Effect {
                 [out, none]
             }
             Effect::BaseTilt(tilt) => [none, tilt.motion_slopes(statics, u, condition)],
-            Effect::LinkTwist(twist) => [twist.motion_slopes(statics, frames), none],
             _ => [none; 2],
+        }
+    }
+
+    /// Derivatives of [`Effect::link_motion`] as the part turns about the axes of the base, beyond being carried along; `None` where it only is.
+    pub fn link_motion_slopes_of_gravity(
+        &self,
+        statics: &Statics,
+        frames: &Chain<f64>,
+    ) -> Option<[LinkMotion<f64>; 3]> {
+        match self {
+            Effect::LinkTwist(twist) => Some(twist.motion_slopes(statics, frames)),
+            _ => None,
+        }
+    }
+
+    /// The joint that has turned what an effect moves before it moves it, so that its axis moves along.
+    pub fn joint_turned_before(&self) -> Option<usize> {
+        match self {
+            Effect::AxisWobble(wobble) => Some(wobble.joint),
+            _ => None,
         }
     }
 

@@ -14,11 +14,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::chain::{Chain, cross, dot, minus, scaled};
+use crate::chain::{Chain, cross, dot, scaled};
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::Statics;
 use crate::link_motion::LinkMotion;
-use truegrind_math::lanes::{Real, SinCos, splats};
+use truegrind_math::lanes::{Real, splats};
 
 /// A link that twists under a load beside it.
 ///
@@ -50,13 +50,11 @@ pub struct LinkTwist {
     pub lean_rad: Option<f64>,
 }
 
-/// What it turns about: the axis of the joint, the directions along the link and across it, and the way from the joint to the link's end
-/// (mm).
+/// The frame at the end of the link: its axis, and the directions along the link and across it.
 struct Directions<R> {
     z: [R; 3],
     x: [R; 3],
     y: [R; 3],
-    lever: [R; 3],
 }
 
 impl LinkTwist {
@@ -77,68 +75,55 @@ impl LinkTwist {
         }
     }
 
+    /// Of the frame at the link's end, whose axis is parallel to that of the joint.
     #[inline(always)]
     fn directions<R: Real>(&self, frames: &Chain<R>) -> Directions<R> {
         let joint = self.joint.min(4);
-        let (z, x) = (frames.z[joint], frames.lateral[joint]);
-        let lever = minus(&frames.origin[joint + 1], &frames.origin[joint]);
-        Directions { z, x, y: cross(&z, &x), lever }
+        let (z, x) = (frames.z[joint + 1], frames.lateral[joint]);
+        Directions { z, x, y: cross(&z, &x) }
     }
 
-    /// A turn about the link's end, as a motion about the origin of the joint's frame.
     #[inline(always)]
-    fn about_end<R: Real>(&self, frames: &Chain<R>, lever: &[R; 3], turn: [R; 3]) -> LinkMotion<R> {
-        LinkMotion { about: frames.origin[self.joint.min(4)], shift: cross(lever, &turn), turn }
+    fn about_end<R: Real>(&self, frames: &Chain<R>, turn: [R; 3]) -> LinkMotion<R> {
+        LinkMotion { about: frames.origin[self.joint.min(4) + 1], turn, ..LinkMotion::none(turn[0]) }
     }
 
-    /// The turns under a moment along `h`, per unit of twist and of lean.
+    /// The turns where gravity points to `g`, per unit of twist and of lean.
     #[inline(always)]
-    fn turns<R: Real>(of: &Directions<R>, h: &[R; 3]) -> [[R; 3]; 2] {
-        [scaled(dot(&of.x, h), &of.x), scaled(dot(&of.y, h), &of.y)]
+    fn turns<R: Real>(of: &Directions<R>, g: &[R; 3]) -> [[R; 3]; 2] {
+        let h = cross(&of.z, g);
+        [scaled(dot(&of.x, &h), &of.x), scaled(dot(&of.y, &h), &of.y)]
+    }
+
+    /// The motion of what the link carries, where gravity points to `g`.
+    #[inline(always)]
+    fn motion_under<R: Real>(&self, frames: &Chain<R>, g: &[R; 3]) -> LinkMotion<R> {
+        let [twist, lean] = Self::turns(&self.directions(frames), g);
+        let number = |value: f64| g[0].splat(value);
+        let (t, l) = (number(self.twist_rad), number(self.lean_rad.unwrap_or(0.0)));
+        self.about_end(frames, [0, 1, 2].map(|k| t * twist[k] + l * lean[k]))
     }
 
     /// The motion of what the link carries.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn motion<R: SinCos>(&self, statics: &Statics, frames: &Chain<R>) -> LinkMotion<R> {
-        let of = self.directions(frames);
-        let h = cross(&of.z, &splats(of.z[0], &statics.gravity()));
-        let [twist, lean] = Self::turns(&of, &h);
-        let number = |value: f64| of.z[0].splat(value);
-        let (t, l) = (number(self.twist_rad), number(self.lean_rad.unwrap_or(0.0)));
-        let turn = [0, 1, 2].map(|k| t * twist[k] + l * lean[k]);
-        self.about_end(frames, &of.lever, turn)
+    pub(super) fn motion<R: Real>(&self, statics: &Statics, frames: &Chain<R>) -> LinkMotion<R> {
+        self.motion_under(frames, &splats(frames.x[0], &statics.gravity()))
     }
 
     /// Its derivatives with respect to the parameters.
     pub(super) fn motion_regressors(&self, statics: &Statics, frames: &Chain<f64>) -> Vec<LinkMotion<f64>> {
-        let of = self.directions(frames);
-        let turns = Self::turns(&of, &cross(&of.z, &statics.gravity()));
+        let turns = Self::turns(&self.directions(frames), &statics.gravity());
         let count = if self.lean_rad.is_some() { 2 } else { 1 };
-        turns[..count].iter().map(|turn| self.about_end(frames, &of.lever, *turn)).collect()
+        turns[..count].iter().map(|turn| self.about_end(frames, *turn)).collect()
     }
 
-    /// Its derivatives with respect to the rotations of the joints. The joint of the link turns x and y; a joint before it turns all of the
-    /// link and this motion with it, but not gravity.
-    pub(super) fn motion_slopes(&self, statics: &Statics, frames: &Chain<f64>) -> [LinkMotion<f64>; 6] {
-        let of = self.directions(frames);
-        let g = statics.gravity();
-        let h = cross(&of.z, &g);
-        let (t, l) = (self.twist_rad, self.lean_rad.unwrap_or(0.0));
-        let mut out = [LinkMotion::none(0.0); 6];
-        let joint = self.joint.min(4);
-        for (before, out) in out.iter_mut().enumerate().take(joint) {
-            let other = cross(&of.z, &cross(&frames.z[before], &g));
-            let [twist, lean] = Self::turns(&of, &other);
-            let turn = [0, 1, 2].map(|k| -t * twist[k] - l * lean[k]);
-            *out = self.about_end(frames, &of.lever, turn);
-        }
-        let (along, across) = (dot(&of.x, &h), dot(&of.y, &h));
-        let turn = [0, 1, 2].map(|k| (t - l) * (along * of.y[k] + across * of.x[k]));
-        let mut own = self.about_end(frames, &of.lever, turn);
-        let moved = cross(&cross(&of.z, &of.lever), &self.motion(statics, frames).turn);
-        (0..3).for_each(|k| own.shift[k] += moved[k]);
-        out[joint] = own;
-        out
+    /// Its derivatives as the link turns about the axes of the base, beyond being carried along: to the link, gravity turns the other way.
+    pub(super) fn motion_slopes(&self, statics: &Statics, frames: &Chain<f64>) -> [LinkMotion<f64>; 3] {
+        std::array::from_fn(|axis| {
+            let mut about = [0.0; 3];
+            about[axis] = 1.0;
+            self.motion_under(frames, &cross(&statics.gravity(), &about))
+        })
     }
 
     /// How far it can move a point within `extent_mm` of the link's end at most (mm).
