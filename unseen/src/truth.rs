@@ -53,11 +53,12 @@ pub enum Meaning {
 /// The names of the diagnosis. One name stands for several families: see [`meanings`].
 ///
 /// A name that is added to the diagnosis is added here, by what its sentence sends a technician to.
-pub const NAMES: [(&str, Family); 49] = [
+pub const NAMES: [(&str, Family); 50] = [
     ("link-geometry", Family::Geometry),
     ("joint-compliance", Family::Compliance),
     ("joint-stiffness", Family::Compliance),
     ("link-bending", Family::Compliance),
+    ("link-twist", Family::Compliance),
     ("compliance", Family::Compliance),
     ("gear-eccentricity", Family::Gear),
     ("gear-transmission", Family::Gear),

@@ -20,6 +20,7 @@ pub mod loaded_backlash;
 pub mod thermal;
 pub mod axis_wobble;
 pub mod base_tilt;
+pub mod link_twist;
 pub mod smooth_correction;
 pub mod bounds;
 mod parameter;
@@ -38,6 +39,7 @@ use self::error_map::ErrorMap;
 use self::gear_ratio::GearRatio;
 use self::hardening::Hardening;
 use self::harmonic::Harmonic;
+use self::link_twist::LinkTwist;
 use self::loaded_backlash::LoadedBacklash;
 use self::lumped_compliance::LumpedCompliance;
 use self::smooth_correction::SmoothCorrection;
@@ -69,6 +71,8 @@ pub enum Effect {
     TorquePowers(TorquePowers),
     /// A link that bends between two parallel axes.
     LinkBending(Bending),
+    /// A link that twists under a load beside it, between two parallel axes.
+    LinkTwist(LinkTwist),
     /// An eccentric gear: once or twice per joint turn.
     GearEccentricity(Harmonic),
     /// A line of the reducer at a higher order.
@@ -114,7 +118,9 @@ macro_rules! turning {
             Effect::Backlash($e) => $body,
             Effect::LoadedBacklash($e) => $body,
             Effect::SmoothCorrection($e) => $body,
-            Effect::ThermalDrift(_) | Effect::AxisWobble(_) | Effect::BaseTilt(_) => $still,
+            Effect::ThermalDrift(_) | Effect::AxisWobble(_) | Effect::BaseTilt(_) | Effect::LinkTwist(_) => {
+                $still
+            }
         }
     };
 }
@@ -126,6 +132,7 @@ macro_rules! each {
             Effect::ThermalDrift($e) => $body,
             Effect::AxisWobble($e) => $body,
             Effect::BaseTilt($e) => $body,
+            Effect::LinkTwist($e) => $body,
             // Of these no other is left.
             turning => turning!(turning, $e => $body, Default::default()),
         }
@@ -139,6 +146,7 @@ impl Effect {
             Effect::JointCompliance(_) | Effect::LumpedCompliance(_) => "joint-compliance",
             Effect::JointStiffness(_) | Effect::TorquePowers(_) => "joint-stiffness",
             Effect::LinkBending(_) => "link-bending",
+            Effect::LinkTwist(_) => "link-twist",
             Effect::GearEccentricity(_) => "gear-eccentricity",
             Effect::GearTransmission(_) | Effect::GearMap(_) => "gear-transmission",
             Effect::GearRatio(_) => "gear-ratio",
@@ -168,6 +176,7 @@ impl Effect {
             Effect::LoadedBacklash(e) => Some(e.joint),
             Effect::AxisWobble(e) => Some(e.joint),
             Effect::LinkBending(_)
+            | Effect::LinkTwist(_)
             | Effect::ThermalDrift(_)
             | Effect::BaseTilt(_)
             | Effect::SmoothCorrection(_) => None,
@@ -181,7 +190,7 @@ impl Effect {
 
     /// Whether it is a deflection that was identified without the masses of the arm: it holds for the load of the measurement alone.
     pub fn holds_for_one_load(&self) -> bool {
-        matches!(self, Effect::LumpedCompliance(_))
+        matches!(self, Effect::LumpedCompliance(_) | Effect::LinkTwist(_))
             || matches!(self, Effect::LinkBending(bending) if bending.frame.is_some())
             || matches!(self, Effect::JointStiffness(spring) if !spring.mass.is_empty())
             || matches!(self, Effect::TorquePowers(powers) if !powers.mass.is_empty())
@@ -239,7 +248,7 @@ impl Effect {
             Effect::Backlash(e) => e.add_offset(condition, out),
             Effect::LoadedBacklash(e) => e.add_offset(statics, u, torque, condition, out),
             Effect::SmoothCorrection(e) => e.add_offset(u, out),
-            Effect::ThermalDrift(_) | Effect::AxisWobble(_) | Effect::BaseTilt(_) => {}
+            Effect::ThermalDrift(_) | Effect::AxisWobble(_) | Effect::BaseTilt(_) | Effect::LinkTwist(_) => {}
         }
     }
 
@@ -263,7 +272,8 @@ impl Effect {
             | Effect::LoadedBacklash(_)
             | Effect::ThermalDrift(_)
             | Effect::AxisWobble(_)
-            | Effect::BaseTilt(_) => {}
+            | Effect::BaseTilt(_)
+            | Effect::LinkTwist(_) => {}
         }
     }
 
@@ -289,6 +299,7 @@ impl Effect {
         match self {
             Effect::AxisWobble(wobble) => Some(wobble.joint + 1),
             Effect::BaseTilt(_) => Some(0),
+            Effect::LinkTwist(twist) => Some(twist.joint + 1),
             _ => None,
         }
     }
@@ -305,6 +316,7 @@ impl Effect {
         match self {
             Effect::AxisWobble(wobble) => wobble.motion(frames, rotations),
             Effect::BaseTilt(tilt) => tilt.motion(statics, u, condition),
+            Effect::LinkTwist(twist) => twist.motion(statics, frames),
             _ => LinkMotion::none(u[0]),
         }
     }
@@ -320,6 +332,7 @@ impl Effect {
         match self {
             Effect::AxisWobble(wobble) => wobble.motion_regressors(frames, &(*rotations).into()),
             Effect::BaseTilt(tilt) => tilt.motion_regressors(statics, u, condition),
+            Effect::LinkTwist(twist) => twist.motion_regressors(statics, frames),
             _ => Vec::new(),
         }
     }
@@ -342,6 +355,26 @@ impl Effect {
             }
             Effect::BaseTilt(tilt) => [none, tilt.motion_slopes(statics, u, condition)],
             _ => [none; 2],
+        }
+    }
+
+    /// Derivatives of [`Effect::link_motion`] as the part turns about the axes of the base, beyond being carried along; `None` where it only is.
+    pub fn link_motion_slopes_of_gravity(
+        &self,
+        statics: &Statics,
+        frames: &Chain<f64>,
+    ) -> Option<[LinkMotion<f64>; 3]> {
+        match self {
+            Effect::LinkTwist(twist) => Some(twist.motion_slopes(statics, frames)),
+            _ => None,
+        }
+    }
+
+    /// The joint that has turned what an effect moves before it moves it, so that its axis moves along.
+    pub fn joint_turned_before(&self) -> Option<usize> {
+        match self {
+            Effect::AxisWobble(wobble) => Some(wobble.joint),
+            _ => None,
         }
     }
 
@@ -373,6 +406,7 @@ impl Effect {
         match self {
             Effect::AxisWobble(wobble) => wobble.largest_mm(2.0 * extent_mm),
             Effect::BaseTilt(tilt) => tilt.largest_mm(extent_mm, mass_kg),
+            Effect::LinkTwist(twist) => twist.largest_mm(2.0 * extent_mm),
             _ => 0.0,
         }
     }

@@ -10,6 +10,7 @@
 use nalgebra::{Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
 
 use super::chain::{Chain, cross, minus};
+use super::link_motion::LinkMotion;
 use super::model::{MovedLinks, PreparedModel};
 use super::parameter::{LinkCoordinate, Parameter};
 use crate::joints::Joints;
@@ -51,9 +52,41 @@ pub fn joint_jacobian(
 ) -> Matrix6<f64> {
     let moved = arm.link_motions(q);
     let mut out = rotation_twists(frames, &moved, point) * arm.rotation_jacobian(q);
-    for MovedLinks { motion, by_mapped_angle, .. } in &moved {
-        let columns = by_mapped_angle.map(|change| motion.twist_vector(&change, point));
+    for index in 0..moved.len() {
+        let columns = moved[index].by_mapped_angle.map(|change| change_twist(&moved, index, &change, point));
         out += Matrix6::from_columns(&columns) * arm.model.joint_map;
+    }
+    out
+}
+
+/// Twist of a point where the motion of links at `index` changes, and with it those that it carries.
+fn change_twist(
+    moved: &[MovedLinks],
+    index: usize,
+    change: &LinkMotion<f64>,
+    point: &[f64; 3],
+) -> Vector6<f64> {
+    let MovedLinks { first, motion, .. } = &moved[index];
+    let twist = motion.twist_vector(change, point);
+    twist + carried_twist(&moved[index + 1..], *first, twist.fixed_rows::<3>(3).into_owned(), point)
+}
+
+/// Twist of a point where the frames from `first` on turn and gravity does not, which changes the motions of links among them, beyond carrying
+/// them along.
+fn carried_twist(
+    moved: &[MovedLinks],
+    first: usize,
+    mut turn: Vector3<f64>,
+    point: &[f64; 3],
+) -> Vector6<f64> {
+    let mut out = Vector6::zeros();
+    for MovedLinks { motion, by_gravity, .. } in moved.iter().filter(|moved| moved.first >= first) {
+        let Some(changes) = by_gravity else { continue };
+        let twist: Vector6<f64> =
+            (0..3).map(|axis| motion.twist_vector(&changes[axis], point) * turn[axis]).sum();
+        out += twist;
+        // The next is carried by this one.
+        turn += twist.fixed_rows::<3>(3);
     }
     out
 }
@@ -61,16 +94,16 @@ pub fn joint_jacobian(
 /// Twists of a point for the rotation of each joint, with the motions of links that follow it.
 fn rotation_twists(frames: &Chain<f64>, moved: &[MovedLinks], point: &[f64; 3]) -> Matrix6<f64> {
     let mut out = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|joint| {
-        link_twist(frames, joint, LinkCoordinate::Theta, point)
-    }));
-    for MovedLinks { first, motion, by_rotation, .. } in moved {
-        if let Some(joint) = first.checked_sub(1) {
-            // Moved after it has turned, what a joint carries turns about its moved axis.
-            let (axis, through) = (motion.turned(&frames.z[joint]), motion.moved(&frames.origin[joint]));
-            out.set_column(joint, &turning(&axis, &through, point));
+        let (mut axis, mut through) = (frames.z[joint], frames.origin[joint]);
+        // Moved after it has turned, what a joint carries turns about its moved axis.
+        for moved in moved.iter().filter(|moved| moved.joint == Some(joint)) {
+            (axis, through) = (moved.motion.turned(&axis), moved.motion.moved(&through));
         }
-        for (mut column, change) in out.column_iter_mut().zip(by_rotation) {
-            column += motion.twist_vector(change, point);
+        turning(&axis, &through, point) + carried_twist(moved, joint + 1, axis.into(), point)
+    }));
+    for (index, moved_links) in moved.iter().enumerate() {
+        for (mut column, change) in out.column_iter_mut().zip(&moved_links.by_rotation) {
+            column += change_twist(moved, index, change, point);
         }
     }
     out
@@ -204,8 +237,8 @@ impl<'a> EffectTwists<'a> {
                 out += along(LinkCoordinate::D) * (growth * link.d_mm);
             }
         }
-        if let Some(moved) = self.moved.iter().find(|moved| moved.index == index) {
-            out += moved.motion.twist_vector(&moved.by_parameter[parameter], &self.point);
+        if let Some(at) = self.moved.iter().position(|moved| moved.index == index) {
+            out += change_twist(&self.moved, at, &self.moved[at].by_parameter[parameter], &self.point);
         }
         out
     }

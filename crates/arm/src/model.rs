@@ -364,7 +364,18 @@ impl PreparedModel<'_> {
             let motion = effect.link_motion(statics, (&mapped.into(), &rotations), of, &frames);
             let [by_rotation, by_mapped_angle] = effect.link_motion_slopes(statics, angles, of, &frames);
             let by_parameter = effect.link_motion_regressors(statics, angles, of, &frames);
-            out.push(MovedLinks { index, first, motion, by_parameter, by_rotation, by_mapped_angle });
+            let by_gravity = effect.link_motion_slopes_of_gravity(statics, &frames);
+            let joint = effect.joint_turned_before();
+            out.push(MovedLinks {
+                index,
+                first,
+                joint,
+                motion,
+                by_parameter,
+                by_rotation,
+                by_mapped_angle,
+                by_gravity,
+            });
             frames.carry(first, &motion);
         }
         out
@@ -378,6 +389,8 @@ pub struct MovedLinks {
     pub index: usize,
     /// The first frame that moves, 0 the base.
     pub first: usize,
+    /// The joint that turns it before it is moved, whose axis moves along.
+    pub joint: Option<usize>,
     /// The motion.
     pub motion: LinkMotion<f64>,
     /// With respect to each parameter.
@@ -386,4 +399,6 @@ pub struct MovedLinks {
     pub by_rotation: [LinkMotion<f64>; 6],
     /// With respect to each mapped angle.
     pub by_mapped_angle: [LinkMotion<f64>; 6],
+    /// As the part turns about the axes of the base, beyond being carried along; `None` where it only is.
+    pub by_gravity: Option<[LinkMotion<f64>; 3]>,
 }

@@ -45,7 +45,6 @@ pub mod marginal;
 mod confirmation;
 pub mod contribution;
 mod play_flanks;
-mod twisting_link;
 mod confounding;
 mod merged;
 mod joint_scatter;

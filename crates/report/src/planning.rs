@@ -237,7 +237,8 @@ const MORE: f64 = 1.5;
 /// A cause with its joints.
 fn named(cause: &CandidateCause) -> String {
     let joints: Vec<String> = cause.joints.iter().map(|joint| (joint + 1).to_string()).collect();
-    let part = if cause.effect == CauseKind::LinkBending { "link" } else { "joint" };
+    let is_link = matches!(cause.effect, CauseKind::LinkBending | CauseKind::LinkTwist);
+    let part = if is_link { "link" } else { "joint" };
     match joints.as_slice() {
         [] => cause.effect.as_str().to_owned(),
         [one] => format!("{} of {part} {one}", cause.effect),

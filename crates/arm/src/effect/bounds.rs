@@ -86,6 +86,11 @@ impl Effect {
                 RUN_OUT_MM.check_all("radial_mm", e.radial_mm.as_slice().as_flattened())
             }
             Effect::BaseTilt(e) => tilt_terms(e),
+            Effect::LinkTwist(e) => {
+                followed_joint(e.joint)?;
+                OFFSET_RAD.check("twist_rad", e.twist_rad)?;
+                OFFSET_RAD.check_all("lean_rad", e.lean_rad.as_slice())
+            }
             Effect::SmoothCorrection(e) => smooth(e),
         }
     }
@@ -163,14 +168,15 @@ fn masses(joint: usize, masses: &[PointMass]) -> Result<(), InvalidValue> {
     Ok(())
 }
 
-fn bending(bending: &Bending) -> Result<(), InvalidValue> {
-    if bending.joint > 4 {
-        return Err(InvalidValue::new(
-            "joint",
-            bending.joint.to_string(),
-            "a joint from 0 to 4, which another follows",
-        ));
+fn followed_joint(joint: usize) -> Result<(), InvalidValue> {
+    if joint < 5 {
+        return Ok(());
     }
+    Err(InvalidValue::new("joint", joint.to_string(), "a joint from 0 to 4, which another follows"))
+}
+
+fn bending(bending: &Bending) -> Result<(), InvalidValue> {
+    followed_joint(bending.joint)?;
     if let Some(frame) = bending.frame.filter(|frame| !(bending.joint + 1..=6).contains(frame)) {
         return Err(InvalidValue::new("frame", frame.to_string(), "a frame from the end of the link to 6"));
     }

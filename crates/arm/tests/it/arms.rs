@@ -16,6 +16,7 @@ use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::hardening::Hardening;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::effect::joint_load::PointMass;
+use truegrind_arm::effect::link_twist::LinkTwist;
 use truegrind_arm::effect::loaded_backlash::LoadedBacklash;
 use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
 use truegrind_arm::effect::smooth_correction::SmoothCorrection;
@@ -469,10 +470,14 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
         term(Some(4), Some([1, 1]), 1e-5),
     ];
     out.effects.push(Effect::BaseTilt(BaseTilt { deep: true, term }));
-    for (joint, radial_mm) in [(1, None), (3, Some([0.02, -0.01, 0.01, 0.03]))] {
-        let tilt_rad = [1e-4, -5e-5, 8e-5, 3e-5];
-        out.effects.push(Effect::AxisWobble(AxisWobble { joint, tilt_rad, radial_mm }));
+    let tilt_rad = [1e-4, -5e-5, 8e-5, 3e-5];
+    out.effects.push(Effect::AxisWobble(AxisWobble { joint: 1, tilt_rad, radial_mm: None }));
+    // Each motion of links is carried by those before it.
+    for (joint, lean_rad) in [(1, None), (2, Some(-8e-5))] {
+        out.effects.push(Effect::LinkTwist(LinkTwist { joint, twist_rad: 5e-5, lean_rad }));
     }
+    let radial_mm = Some([0.02, -0.01, 0.01, 0.03]);
+    out.effects.push(Effect::AxisWobble(AxisWobble { joint: 3, tilt_rad, radial_mm }));
     out.effects.push(Effect::SmoothCorrection(SmoothCorrection {
         centres_rad: vec![[0.0, 0.3, -0.2], [0.8, -0.4, 0.5], [-0.9, 0.1, 1.0]],
         reach_rad: 1.6,

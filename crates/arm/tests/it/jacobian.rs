@@ -147,7 +147,8 @@ fn parameter_jacobian_has_a_numerical_twin_on_every_arm() {
         let mut model = spoiled(sheet, 33);
         // The torques turn with the links: a second-order share, which the analytic derivative leaves out. Without
         // compliance everything is exact; compliance has a test of its own, as has what moves with the links.
-        let yields = ["joint-compliance", "joint-stiffness", "link-bending", "base-tilt", "axis-wobble"];
+        let yields =
+            ["joint-compliance", "joint-stiffness", "link-bending", "link-twist", "base-tilt", "axis-wobble"];
         model.effects.retain(|e| !yields.contains(&e.name()) && !matches!(e, Effect::LoadedBacklash(_)));
         let mut random = generator(34);
         let mut six = |mm: f64, rad: f64| {

@@ -7,6 +7,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::axis_wobble::AxisWobble;
 use truegrind_arm::effect::base_tilt::{BaseTilt, TiltTerm};
+use truegrind_arm::effect::link_twist::LinkTwist;
 use truegrind_arm::model::Model;
 use truegrind_math::se3::{Pose, difference};
 
@@ -53,6 +54,36 @@ fn a_soft_base_turns_and_sways_under_masses_and_payload() {
         let error = difference(&soft.forward(&q, &load), &(base * arm.forward(&q, &load)));
         assert!(error.fixed_rows::<3>(0).amax() < 1e-6, "{}: {error}", SHEETS[sheet].name);
         assert!(error.fixed_rows::<3>(3).amax() < 1e-9, "{}: {error}", SHEETS[sheet].name);
+    }
+}
+
+#[test]
+fn a_link_twists_and_the_axis_at_its_end_leans() {
+    let mut random = generator(65);
+    let still = Condition::default();
+    for sheet in 0..SHEETS.len() {
+        let arm = bare(sheet, 64);
+        for joint in 0..5 {
+            let twist = LinkTwist { joint, twist_rad: 2e-4, lean_rad: Some(5e-4) };
+            let soft = Model { effects: vec![Effect::LinkTwist(twist)], ..arm.clone() };
+            let q = joints_within(&arm, &mut random);
+            // What stands in the base at the end of the link turns there; the rest of the arm goes along.
+            let mut poses = vec![Pose::identity()];
+            for (i, link) in arm.links.iter().enumerate() {
+                poses.push(poses[i] * link.pose(arm.mapped(&q)[i]));
+            }
+            let (root, end) = (poses[joint], poses[joint + 1].translation.vector);
+            let z = poses[joint + 1].rotation * Vector3::z();
+            let angle = arm.mapped(&q)[joint] + arm.links[joint].theta_rad;
+            let x = root.rotation * Vector3::new(angle.cos(), angle.sin(), 0.0);
+            let (y, h) = (z.cross(&x), z.cross(&arm.gravity));
+            let turn = x * (2e-4 * x.dot(&h)) + y * (5e-4 * y.dot(&h));
+            let to_end = Pose::translation(end.x, end.y, end.z);
+            let expected = to_end * moved(Vector3::zeros(), turn) * to_end.inverse() * poses[6] * arm.flange;
+            let error = difference(&soft.forward(&q, &still), &expected);
+            assert!(error.fixed_rows::<3>(0).amax() < 1e-6, "{}: {error}", SHEETS[sheet].name);
+            assert!(error.fixed_rows::<3>(3).amax() < 1e-9, "{}: {error}", SHEETS[sheet].name);
+        }
     }
 }
 

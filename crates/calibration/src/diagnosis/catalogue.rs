@@ -28,9 +28,10 @@ use truegrind_arm::effect::coupling::Coupling;
 use truegrind_arm::effect::error_map::ErrorMap;
 use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::harmonic::Harmonic;
+use truegrind_arm::effect::link_twist::LinkTwist;
 use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
 use truegrind_arm::effect::thermal::Thermal;
-use truegrind_arm::model::Model;
+use truegrind_arm::model::{Joints, Model};
 use truegrind_math::work::checkpoint;
 
 /// A cause with its regressors.
@@ -372,9 +373,12 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: all }), 1.0));
         }
     }
+    effects.push((Effect::LumpedCompliance(beside_the_flange_axis()), 1.0));
     effects.extend(
         bending_links(nominal).into_iter().map(|(bending, tried)| (Effect::LinkBending(bending), tried)),
     );
+    effects
+        .extend(twisting_links(nominal).into_iter().map(|(twist, tried)| (Effect::LinkTwist(twist), tried)));
     // Gravity that is not along the base's vertical axis: the same torques along the two other axes of the base.
     let down = nominal.gravity.iamax();
     let across: Vec<usize> = (0..3).filter(|&axis| axis != down).collect();
@@ -407,13 +411,38 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         .into_par_iter()
         .map(|(effect, tried)| {
             checkpoint();
-            Candidate { tried, ..Candidate::arm(effect, dataset, nominal) }
+            Candidate { tried, ..Candidate::of(&Cause::Arm(effect), subject) }
         })
         .collect()
 }
 
 /// Prior odds of a joint that yields against the link between two joints that does: reducers are some ten times as soft as castings.
 const LINK_ODDS: f64 = 10.0;
+
+/// Joint 5 under a tool that stands beside the axis of the flange, or a motor beside the wrist: a mass on that axis, and first moments of
+/// the last two links across it, which turn with joint 6 or do not. With a mass on the axis alone most of such a deflection was left, and
+/// passed for a target that droops or for a gear.
+fn beside_the_flange_axis() -> LumpedCompliance {
+    let beside = |frame| [0, 1].map(|axis| Lump { frame, axis: None, moment: Some(axis), factor: 0.0 });
+    let on_axis = Lump { frame: 6, axis: None, moment: None, factor: 0.0 };
+    LumpedCompliance { joint: 4, lump: [on_axis].into_iter().chain(beside(5)).chain(beside(6)).collect() }
+}
+
+/// Least sine of the angle between the axis of a link's joint and gravity where a load beside the arm shows.
+const ACROSS_GRAVITY: f64 = 0.5;
+
+/// Links between parallel axes that can twist under a load beside the arm.
+fn twisting_links(nominal: &Model) -> Vec<(LinkTwist, f64)> {
+    let frames = nominal.at_condition(&Condition::default()).frames(&Joints::zeros());
+    let is_across =
+        |joint: usize| Vector3::from(frames.z[joint]).cross(&nominal.gravity).norm() > ACROSS_GRAVITY;
+    let parallel = (0..5).filter(|&joint| parallel_neighbours(nominal, joint, joint + 1).is_some());
+    parallel
+        .filter(|&joint| is_across(joint))
+        .flat_map(|joint| [None, Some(0.0)].map(|lean_rad| LinkTwist { joint, twist_rad: 0.0, lean_rad }))
+        .map(|twist| (twist, LINK_ODDS))
+        .collect()
+}
 
 /// Links between parallel axes that can bend under gravity, with the number of variants of each: where masses are not known the load is put
 /// at elbow, wrist or flange.

@@ -90,6 +90,7 @@ impl Cause {
             Cause::Arm(Effect::JointCoupling(c)) => vec![c.driver, c.joint],
             Cause::Arm(Effect::GearTwoJoints(gear)) => vec![gear.joint, gear.other],
             Cause::Arm(Effect::LinkBending(b)) => vec![b.joint],
+            Cause::Arm(Effect::LinkTwist(twist)) => vec![twist.joint],
             Cause::Arm(effect) => effect.joint().into_iter().collect(),
             Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.joints(),
             Cause::Measurement(Disturbance { kind: Kind::JointZero { joint }, .. }) => vec![*joint],
@@ -126,6 +127,10 @@ impl Cause {
         match self {
             Cause::Arm(Effect::JointCompliance(c)) => c.compliance_rad_per_nm >= 0.0,
             Cause::Arm(Effect::LinkBending(b)) => b.compliance_rad_per_nm >= 0.0,
+            // The same load twists the link and tilts its end, to whichever side it stands.
+            Cause::Arm(Effect::LinkTwist(twist)) => {
+                twist.lean_rad.is_none_or(|lean| twist.twist_rad * lean >= 0.0)
+            }
             Cause::Arm(effect @ (Effect::Backlash(_) | Effect::LoadedBacklash(_))) => {
                 effect.play_rad().is_none_or(|(_, play)| play >= 0.0)
             }
@@ -289,7 +294,7 @@ impl Cause {
                 kind: Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),
                 ..
             }) => Part::Backlash,
-            Cause::Arm(Effect::AxisWobble(_))
+            Cause::Arm(Effect::AxisWobble(_) | Effect::LinkTwist(_))
             | Cause::Measurement(Disturbance {
                 kind: Kind::Empirical(EmpiricalFault::AxisWobble { .. }),
                 ..

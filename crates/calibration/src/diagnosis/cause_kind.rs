@@ -133,6 +133,11 @@ kinds! {
     LinkGeometry = "link-geometry",
         remedy: "compare the type plate and the controller's kinematics with the data sheet before anything else; write the arm's \
             own data sheet if it is a variant";
+    /// A link that twists under a load beside it.
+    LinkTwist = "link-twist",
+        pattern: "the residual tilts about the end of link {joint} as the link turns against gravity",
+        remedy: "check the bolts of this link and the bearing at its end, axially, with a load beside the arm; the written model \
+            corrects for it with the tool that was measured";
     /// Single wrong rows.
     Outliers = "outliers",
         remedy: "measure these rows again";
@@ -208,6 +213,7 @@ impl From<&Effect> for CauseKind {
         match effect {
             Effect::JointCompliance(_) | Effect::LumpedCompliance(_) => CauseKind::JointCompliance,
             Effect::LinkBending(_) => CauseKind::LinkBending,
+            Effect::LinkTwist(_) => CauseKind::LinkTwist,
             Effect::GearEccentricity(_) => CauseKind::GearEccentricity,
             Effect::GearTransmission(_) | Effect::GearMap(_) => CauseKind::GearTransmission,
             Effect::GearRatio(_) => CauseKind::GearRatio,

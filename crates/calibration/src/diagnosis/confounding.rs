@@ -10,7 +10,6 @@ use super::cause_kind::CauseKind;
 use super::confirmation::Confirmation;
 use super::contribution::Contributions;
 use super::play_flanks;
-use super::twisting_link;
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::model::Model;
 use truegrind_math::distribution::chi_square_quantile;
@@ -126,12 +125,6 @@ impl Confounding<'_> {
         if all(&|cause| cause.follows_gravity_angle(self.nominal)) {
             out.push(
                 "it depends on the angle relative to gravity: a compliance or backlash with an unknown law looks the same"
-                    .to_owned(),
-            );
-        }
-        if all(&|cause| twisting_link::may_be_twist(cause, self.nominal)) {
-            out.push(
-                "it tilts the axis in the phase that gravity gives: a link that twists under a load beside it looks the same"
                     .to_owned(),
             );
         }

@@ -36,9 +36,8 @@ pub const DECIDED_BY_POSES: [CauseKind; 10] = [
 pub(super) fn family(effect: CauseKind) -> Option<Family> {
     use CauseKind::*;
     Some(match effect {
-        LinkGeometry | LinkBending | JointCompliance | JointStiffness | ThermalDrift | SmoothCorrection => {
-            Family::Arm
-        }
+        LinkGeometry | LinkBending | LinkTwist | JointCompliance | JointStiffness | ThermalDrift
+        | SmoothCorrection => Family::Arm,
         GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | JointZeroShift
         | Backlash | AxisWobble => Family::Drive,
         SensorScale | SensorAxes | SensorRange | LensDistortion | CableSag | CablePulley | CableDrum
@@ -148,6 +147,9 @@ fn in_words(effect: CauseKind) -> Option<&'static str> {
         AxisWobble => {
             "turn this joint alone through its whole range, and read a target far from its axis and one near it at every ten degrees: what \
              leaves the plane of the circle twice a turn is the bearing"
+        }
+        LinkTwist => {
+            "measure the same ten poses with and without a load beside the flange: what changes is the link, and not a bearing"
         }
         GearTwoJoints | GearTransmission => {
             "turn each joint in question alone through its whole range in steps of a few degrees, and read at each: what returns with the angle \

@@ -314,7 +314,8 @@ fn is_beaten(rival: &Alternative, after_mm: f64) -> bool {
 /// Whether a spring of the arm is certain and only its place is not: every rival that might be true is another spring, a link or a joint.
 /// The arm is nearer to the truth with it than without.
 pub(super) fn is_some_spring(finding: &Finding) -> bool {
-    let spring = |kind| matches!(kind, CauseKind::JointCompliance | CauseKind::LinkBending);
+    let spring =
+        |kind| matches!(kind, CauseKind::JointCompliance | CauseKind::LinkBending | CauseKind::LinkTwist);
     let after_mm = finding.gain.cv_rmse_after_mm;
     let mut rivals = finding.alternatives.iter().filter(|rival| !is_beaten(rival, after_mm));
     spring(finding.effect) && finding.doubts.is_empty() && rivals.all(|rival| spring(rival.effect))

@@ -1,5 +1,5 @@
 //! What is wrong with a law whose form is only assumed: springs that are not linear, errors of two joints, a base that tilts, an axis that
-//! wobbles, links that grow alike.
+//! wobbles, links that twist or grow alike.
 //!
 //! The covariance of a fit counts what the rows leave open of the parameters, as if the law were right. It is not: the rest of an effect that
 //! its law does not follow shows at other poses too. It is stated as if the whole effect were known to a share s of its size alone: with its
@@ -18,6 +18,8 @@ fn share(effect: &Effect) -> Option<f64> {
         Effect::LoadedBacklash(_) => Some(0.25),
         Effect::JointStiffness(_) | Effect::TorquePowers(_) | Effect::ThermalDrift(_) => Some(0.1),
         Effect::GearTwoJoints(_) | Effect::LinkBending(_) => Some(0.05),
+        // Its load is taken to stand beside the arm by the same length in all poses.
+        Effect::LinkTwist(_) => Some(0.1),
         Effect::BaseTilt(_) | Effect::AxisWobble(_) => Some(0.03),
         _ => None,
     }

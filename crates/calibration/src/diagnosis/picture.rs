@@ -37,6 +37,7 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &De
     let joint = match cause {
         Cause::Arm(Effect::ThermalDrift(_)) | Cause::Measurement(_) => None,
         Cause::Arm(Effect::LinkBending(bending)) => Some(bending.joint),
+        Cause::Arm(Effect::LinkTwist(twist)) => Some(twist.joint),
         Cause::Arm(effect) => effect.joint(),
     };
     let number = |i: usize| dataset.rows[i].number as f64;

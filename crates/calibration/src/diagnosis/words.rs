@@ -12,6 +12,7 @@ use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::{EmpiricalFault, Overturning, Pole};
 use nalgebra::Vector3;
 use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::link_twist::LinkTwist;
 use truegrind_arm::effect::loaded_backlash::LoadedBacklash;
 
 /// Values and standard deviations of the parameters of cause `index`.
@@ -145,6 +146,7 @@ pub fn describe_cause(
             value * 1e6 / 3.0
         ),
         Cause::Arm(Effect::LinkBending(_)) => format!("link {joint} bends under what it carries"),
+        Cause::Arm(Effect::LinkTwist(twist)) => twists(joint, twist),
         Cause::Arm(Effect::GearEccentricity(h)) => format!(
             "the gear or encoder of joint {joint} is eccentric: ±{:.3}° {} per turn",
             h.amplitude_rad().to_degrees(),
@@ -437,6 +439,15 @@ fn wobbles(joint: usize, tilt_rad: [f64; 4]) -> String {
     )
 }
 
+/// Of a link (from 1) that turns under a load beside it.
+fn twists(link: usize, twist: &LinkTwist) -> String {
+    let level = twist.twist_rad.abs().to_degrees();
+    let upright = twist.lean_rad.map_or_else(String::new, |lean| {
+        format!(", and the axis at its end leans by up to {:.4}°", lean.abs().to_degrees())
+    });
+    format!("link {link} twists under a load beside the plane of the arm by up to {level:.4}°{upright}")
+}
+
 /// Of a base whose load is not known.
 const TILTS_UNDER_UNKNOWN_MASSES: &str =
     "the base tilts under the overturning moment of the arm, with masses that no data sheet states";
@@ -505,6 +516,7 @@ pub(super) fn remedy_left_out(effect: CauseKind, uncertain: bool) -> String {
     let further = match effect {
         JointCompliance => "check belts and reducer preload",
         LinkBending => "check the bolts of this link",
+        LinkTwist => "check the bolts of this link, and the bearing at its end, axially",
         GearEccentricity => "at the next repair, look at the gear and the encoder ring",
         GearTransmission => "inspect the reducer for wear",
         GearTwoJoints => {

@@ -41,7 +41,8 @@ fn stands_alike_after_a_turn(arm: &Estimated, joint: usize) -> bool {
             | Effect::LoadedBacklash(_)
             | Effect::ThermalDrift(_)
             | Effect::AxisWobble(_)
-            | Effect::BaseTilt(_) => true,
+            | Effect::BaseTilt(_)
+            | Effect::LinkTwist(_) => true,
             Effect::JointCoupling(_) | Effect::SmoothCorrection(_) => false,
             _ => effect.joint() != Some(joint),
         })

@@ -64,7 +64,8 @@ pub(crate) fn place(finding: &Finding) -> String {
 
 /// Links, joints or rows, for a cell.
 pub(super) fn place_of(effect: CauseKind, joints: Option<&[usize]>, rows: Option<[usize; 2]>) -> String {
-    let part = if effect == CauseKind::LinkBending { "link" } else { "joint" };
+    let is_link = matches!(effect, CauseKind::LinkBending | CauseKind::LinkTwist);
+    let part = if is_link { "link" } else { "joint" };
     let at = match joints {
         Some([one]) => Some(format!("{part} {one}")),
         Some(several @ [_, ..]) => Some(format!("{part}s {}", sentence::listed(several))),

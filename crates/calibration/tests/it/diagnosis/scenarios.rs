@@ -328,6 +328,7 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         | Hidden::Depth { .. }
         | Hidden::Droop { .. }
         | Hidden::Twist { .. }
+        | Hidden::SideTool { .. }
         | Hidden::Reversal { .. }
         | Hidden::Lens { .. }
         | Hidden::Tilt { .. }

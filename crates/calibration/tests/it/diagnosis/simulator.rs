@@ -57,6 +57,12 @@ pub enum Hidden {
         joint: usize,
         peak_rad: f64,
     },
+    /// A joint of the wrist yields under a tool of 4 kg that stands beside the axis of the flange by these (mm): by this where it yields most.
+    SideTool {
+        joint: usize,
+        peak_rad: f64,
+        aside_mm: [f64; 2],
+    },
     /// A joint stands off by this in all rows up to one.
     LostCounts {
         joint: usize,
@@ -159,7 +165,7 @@ impl Hidden {
     /// The contract's name.
     pub fn name(&self) -> &'static str {
         match self {
-            Hidden::Compliance { .. } => "joint-compliance",
+            Hidden::Compliance { .. } | Hidden::SideTool { .. } => "joint-compliance",
             Hidden::Bending { .. } => "link-bending",
             Hidden::Twist { .. } => "link-twist",
             Hidden::LostCounts { .. } => "joint-zero-shift",
@@ -193,6 +199,7 @@ impl Hidden {
         match self {
             Hidden::Compliance { joint, .. }
             | Hidden::Twist { joint, .. }
+            | Hidden::SideTool { joint, .. }
             | Hidden::Bending { joint, .. }
             | Hidden::LostCounts { joint, .. }
             | Hidden::Gear { joint, .. }
@@ -309,6 +316,18 @@ impl Arm {
         up[joint] += h;
         down[joint] -= h;
         -(self.energy(&up, flange_kg) - self.energy(&down, flange_kg)) / (2.0 * h)
+    }
+
+    /// Static torque about a joint (N m) of a tool of 4 kg whose centre stands 100 mm in front of the flange, beside its axis.
+    fn torque_of_tool(&self, u: &[f64; 6], joint: usize, aside_mm: [f64; 2]) -> f64 {
+        let h = 1e-5;
+        let height = |turn: f64| {
+            let mut turned = *u;
+            turned[joint] += turn;
+            let centre = Vector4::new(aside_mm[0], aside_mm[1], 100.0, 1.0);
+            (self.frames(&turned)[6] * self.flange * centre).xyz().dot(&self.up)
+        };
+        -4.0 * 9.81e-3 * (height(h) - height(-h)) / (2.0 * h)
     }
 
     /// Moment (N m) about the end of the link from a joint to the next, of all that hangs beyond, without the part about the next axis.
@@ -454,6 +473,10 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                 .iter()
                 .map(|q| arm.moment_beside(&(arm.joint_map * q).into(), *joint).norm())
                 .fold(1e-9, f64::max),
+            Hidden::SideTool { joint, aside_mm, .. } => poses
+                .iter()
+                .map(|q| arm.torque_of_tool(&(arm.joint_map * q).into(), *joint, *aside_mm).abs())
+                .fold(1e-9, f64::max),
             Hidden::Bending { joint, .. } => poses
                 .iter()
                 .map(|q| arm.elastic_curve(&(arm.joint_map * q).into(), *joint).0.norm())
@@ -482,6 +505,9 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                 match h {
                     Hidden::Compliance { joint, peak_rad } => {
                         turned[*joint] += peak_rad * arm.torque(&u, *joint, 0.0) / peaks[k];
+                    }
+                    Hidden::SideTool { joint, peak_rad, aside_mm } => {
+                        turned[*joint] += peak_rad * arm.torque_of_tool(&u, *joint, *aside_mm) / peaks[k];
                     }
                     Hidden::Gear { joint, order, peak_rad, phase } => {
                         turned[*joint] += peak_rad * (order * u[*joint] + phase).cos();
