@@ -1,8 +1,10 @@
 //! Residual plot that shows a cause: residuals against the revealing variable, without and with the cause in the model.
 
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 
+use super::catalogue::Candidate;
 use super::cause::Cause;
+use super::cause_kind::CauseKind;
 use super::design::Design;
 use super::extension::Subject;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
@@ -34,10 +36,12 @@ const LEVER: f64 = 0.25;
 /// The picture of a cause: `before` is the model without it, `after` the extended one.
 pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &Design) -> Picture {
     let dataset = &subject.observed.dataset;
+    if matches!(cause.kind(), CauseKind::AxisWobble | CauseKind::BaseTilt | CauseKind::LinkTwist) {
+        return moving_links(subject, cause, before, after);
+    }
     let joint = match cause {
         Cause::Arm(Effect::ThermalDrift(_)) | Cause::Measurement(_) => None,
         Cause::Arm(Effect::LinkBending(bending)) => Some(bending.joint),
-        Cause::Arm(Effect::LinkTwist(twist)) => Some(twist.joint),
         Cause::Arm(effect) => effect.joint(),
     };
     let number = |i: usize| dataset.rows[i].number as f64;
@@ -92,6 +96,40 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &De
             .collect()
     };
     Picture { x: x_label, y: (y_label, "mm"), before: shown(before), after: shown(after), rows: cause.rows() }
+}
+
+/// The picture of a cause that moves links: the residual along the motion that it alone makes in each row, over the angle of its joint; where it has
+/// none, over the size of the motion. No turn about one joint shows it.
+fn moving_links(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &Design) -> Picture {
+    let values = DVector::from_vec(cause.values());
+    let columns = Candidate::of(cause, subject).columns(before);
+    // What links and frames can make of it, they have made.
+    let motion = before.pure(&columns, &before.project(&columns)) * values;
+    let coordinates = before.per.min(3);
+    let of_row = |whitened: &DVector<f64>, i: usize| {
+        Vector3::from_fn(|k, _| {
+            let s = i * before.per + k;
+            if k < coordinates { whitened[s] * before.slopes.mm[s] } else { 0.0 }
+        })
+    };
+    let motions: Vec<Vector3<f64>> = (0..before.observations).map(|i| of_row(&motion, i)).collect();
+    let longest = motions.iter().map(Vector3::norm).fold(0.0, f64::max);
+    let dataset = &subject.observed.dataset;
+    let joint = cause.joints().first().copied();
+    let shown = |design: &Design| -> Vec<[f64; 2]> {
+        let rows = motions.iter().enumerate().filter(|(_, motion)| motion.norm() > LEVER * longest);
+        rows.map(|(i, motion)| {
+            let x = joint.map_or(motion.norm(), |joint| dataset.rows[i].joints[joint].to_degrees());
+            // The columns are derivatives of the residual, which the cause makes smaller.
+            [x, -of_row(&design.residual, i).dot(&motion.normalize())]
+        })
+        .collect()
+    };
+    let x = joint.map_or(("size of this cause's own motion".to_owned(), "mm"), |joint| {
+        (format!("angle of joint {}", joint + 1), "°")
+    });
+    let y = ("residual along this cause's own motion".to_owned(), "mm");
+    Picture { x, y, before: shown(before), after: shown(after), rows: None }
 }
 
 /// Horizontal axis for a cause of the measurement or a thermal cause.

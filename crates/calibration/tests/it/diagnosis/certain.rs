@@ -422,6 +422,12 @@ fn a_link_that_twists_under_a_load_beside_it_is_no_axis_that_wobbles() {
     assert_eq!(identified(&found)[0].corrected, Some(true));
     let fits = &found.diagnosis.fits;
     assert!(fits.extended.cv_rmse_mm < 0.93 * fits.geometric.cv_rmse_mm, "{fits:?}");
+    // The picture shows it: along its motion the residual is to one side without it.
+    let picture = found.pictures[0].as_ref().unwrap();
+    assert_eq!(picture.x.0, "angle of joint 2");
+    let [before, after] = [&picture.before, &picture.after]
+        .map(|points| points.iter().map(|point| point[1]).sum::<f64>() / points.len() as f64);
+    assert!(before > 0.01 && after.abs() < 0.2 * before, "{before} {after}");
 }
 
 /// A tool beside the axis of the flange turns joint 5 as far as joint 6 lets it hang: no target that droops, no gear, and nothing is left.
