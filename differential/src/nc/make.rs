@@ -126,7 +126,7 @@ pub fn program(seed: u64, control: Control, setting: &Setting, features: Feature
     let mut text = lines.join("\n");
     text.push('\n');
     // Programs without increments, in which the places after a shift are known.
-    if seed >= INCREMENTS && seed % 3 == 0 {
+    if seed >= INCREMENTS && seed.is_multiple_of(3) {
         for (increment, absolute) in [
             ("G91\n", "G90\n"),
             ("G91 ", "G90 "),
