@@ -48,8 +48,15 @@ pub fn compare(pair: &Pair<'_>, before: &[Event], after: &[Event], whole: bool) 
             }
             return judge.tally;
         };
-        judge.before_cycle =
-            matches!(old.as_slice().first(), Some(Event::Elsewhere(_, text, _)) if text.contains("G81"));
+        let mut ahead = old.clone().filter(|event| !matches!(event, Event::Note(_)));
+        judge.before_cycle = match (ahead.next(), ahead.next()) {
+            (Some(Event::Elsewhere(_, text, _)), _) => text.contains("G81") || text.contains("M99"),
+            // The block that calls a cycle of Heidenhain may move to its place first.
+            (Some(Event::Move(done)), Some(Event::Elsewhere(line, text, _))) => {
+                done.line == *line && text.contains("M99")
+            }
+            _ => false,
+        };
         judge.event(this, new);
         if !judge.tally.disagreements.is_empty() {
             return judge.tally;
