@@ -729,15 +729,14 @@ fn may_increment(tree: &NcTree<'_>, dialect: Dialect) -> bool {
     let mut tokens =
         (0..tree.len() as u32).filter(|token| tree.kind(*token) != Some(Token::Space)).peekable();
     while let Some(token) = tokens.next() {
-        let name = tree.text(token).to_ascii_uppercase();
-        let may = match (dialect, &*name) {
-            (_, b"G") => tokens.peek().is_some_and(|code| {
+        let may = match (dialect, tree.text(token)) {
+            (_, b"G" | b"g") => tokens.peek().is_some_and(|code| {
                 let number =
                     std::str::from_utf8(tree.text(*code)).ok().and_then(|text| text.parse::<f64>().ok());
                 number.is_none_or(|number| number == 91.0)
             }),
-            (Dialect::Siemens, b"IC") => true,
-            (Dialect::Heidenhain, [b'I', _] | [b'I', b'P', _]) => true,
+            (Dialect::Siemens, name) => name.eq_ignore_ascii_case(b"IC"),
+            (Dialect::Heidenhain, [b'I' | b'i', _] | [b'I' | b'i', b'P' | b'p', _]) => true,
             _ => false,
         };
         if may {
