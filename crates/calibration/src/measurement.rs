@@ -23,6 +23,7 @@ pub mod sensor;
 pub mod registration;
 pub mod stations;
 pub mod repeated_poses;
+mod reversed_sides;
 pub mod noise_floor;
 pub mod split;
 pub mod simulation;

@@ -56,8 +56,34 @@ pub(super) struct Confirmation {
     pub changed: usize,
     /// Whether its size is physically plausible, and no other finding explains the same rows.
     pub plausible: bool,
-    /// Whether it is a compliance by which loads would lift the arm, as one does that hangs and is taken for one that stands.
-    pub lifts: bool,
+    /// What its sign says, if that is the wrong one.
+    pub wrong_sign: Option<WrongSign>,
+}
+
+/// What a cause with a sign that it cannot have says of what was stated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum WrongSign {
+    /// Loads would lift the arm, as they do one that hangs and is taken for one that stands.
+    Lifts,
+    /// A play would be negative: the logged sides of approach are reversed.
+    SidesReversed,
+}
+
+impl WrongSign {
+    /// What to do about it.
+    fn doubt(self) -> String {
+        match self {
+            WrongSign::Lifts => {
+                "negative: weight would lift the arm. If it hangs upside down, write its robot file (`truegrind robots NAME -o ARM.toml`), set \
+                 gravity = [0.0, 0.0, 1.0] under [robot.mounting], and diagnose again with --robot ARM.toml"
+            }
+            WrongSign::SidesReversed => {
+                "negative, which no play is: the sides of approach seem to be reversed. In approach1 to approach6, −1 is from below (the angle \
+                 grew) and +1 from above; if the columns hold the direction of motion, change their signs and diagnose again"
+            }
+        }
+        .to_owned()
+    }
 }
 
 /// Number of halves in which a cause can fail and still be confirmed.
@@ -99,12 +125,8 @@ impl Confirmation {
     /// Why it is not confirmed.
     pub(super) fn doubts(&self) -> Vec<String> {
         let mut out = Vec::new();
-        if self.lifts {
-            out.push(
-                "negative: weight would lift the arm. If it hangs upside down, write its robot file (`truegrind robots NAME -o ARM.toml`), set \
-                 gravity = [0.0, 0.0, 1.0] under [robot.mounting], and diagnose again with --robot ARM.toml"
-                    .to_owned(),
-            );
+        if let Some(sign) = self.wrong_sign {
+            out.push(sign.doubt());
         } else if !self.plausible {
             out.push("physically implausible size, or another finding explains the same rows".to_owned());
         }
@@ -294,6 +316,17 @@ impl ConfirmationContext<'_> {
         sum * sum > CONFOUNDED * count * square
     }
 
+    /// What the sign of a cause says, if that is the wrong one.
+    fn wrong_sign(&self, cause: &Cause) -> Option<WrongSign> {
+        match cause {
+            _ if cause.has_plausible_sign() => None,
+            Cause::Arm(Effect::JointCompliance(_)) => Some(WrongSign::Lifts),
+            // Sides from the order of the rows have the right sign.
+            Cause::Arm(Effect::Backlash(_)) if !self.sides_from_order => Some(WrongSign::SidesReversed),
+            _ => None,
+        }
+    }
+
     /// Whether loads can be what bends a joint or tilts the base: those of one direction of gravity, and of positive masses.
     fn is_under_weight(&self, index: usize) -> bool {
         let Some(covariance) = &self.fit.estimate.covariance else { return true };
@@ -396,8 +429,7 @@ impl ConfirmationContext<'_> {
                 && self.is_under_weight(index)
                 && !self.is_confounded_with_lag(&own.candidate.cause)
                 && !(own.candidate.cause.is_growth_of_arm() && self.grows_beyond_heat()),
-            lifts: matches!(&own.candidate.cause, Cause::Arm(Effect::JointCompliance(_)))
-                && !own.candidate.cause.has_plausible_sign(),
+            wrong_sign: self.wrong_sign(&own.candidate.cause),
         }
     }
 }

@@ -14,6 +14,7 @@ use super::plausibility::{
     ComparedReading, PayloadSuspicion, UnitSuspicion, implausible_temperature, implausible_time, plausibility,
 };
 use super::reach::without_impossible_readings;
+use super::reversed_sides::note_reversed_sides;
 use super::stations::{StationError, in_frame_of_first, rows_of_stations};
 use truegrind_arm::model::Model;
 
@@ -70,6 +71,7 @@ pub fn prepare_rows(
     let mut dataset =
         convention.apply(dataset, nominal).ok_or_else(|| Mismatch::JointMap { robot: robot.to_owned() })?;
     note_joints_out_of_range(&mut dataset, &nominal.limits);
+    note_reversed_sides(&mut dataset);
     in_frame_of_first(&mut dataset, nominal)?;
     Ok(dataset)
 }

@@ -383,6 +383,21 @@ fn an_arm_that_hangs_is_told_how_to_be_stated() {
     assert!(lifted.doubts.iter().any(|doubt| doubt.contains("[robot.mounting]")), "{:?}", lifted.doubts);
 }
 
+/// A play that is negative: the columns hold the direction of motion. The doubt says so.
+#[test]
+fn reversed_sides_of_approach_are_told() {
+    let hidden = [Hidden::Backlash { joint: 1, play_rad: 6e-4 }];
+    let mut dataset = run(&arm(), &hidden, &setup(Sensor::Position, 300, 93)).dataset;
+    for row in &mut dataset.rows {
+        let condition = std::sync::Arc::make_mut(&mut row.condition);
+        condition.approach = condition.approach.map(|side| -side);
+    }
+    let found = diagnosed(&dataset);
+    let play = found.diagnosis.findings.iter().find(|f| f.effect == "backlash").unwrap();
+    assert_eq!(play.confidence, Confidence::Ambiguous);
+    assert!(play.doubts.iter().any(|doubt| doubt.contains("change their signs")), "{:?}", play.doubts);
+}
+
 /// A slender link turns what it carries, and its first axis, by torques of both: two compliant joints cannot imitate that. The written arm
 /// contains it.
 #[test]

@@ -178,3 +178,20 @@ fn joints_out_of_their_range_are_noted() {
     let expected = "rows 3 and 7 (2 of 12): joint 5 is at up to -140.0°, its range in the data sheet is -120.0° to 120.0°";
     assert!(found.notes.iter().any(|note| note.starts_with(expected)), "{:?}", found.notes);
 }
+
+/// Sides as the row before has them are not remarked on, nor are those of a program that chooses its sides; reversed ones are.
+#[test]
+fn reversed_sides_of_approach_are_noted() {
+    let notes = |side: &dyn Fn(usize, f64) -> i8| {
+        let mut all = rows(40);
+        for i in 1..all.len() {
+            let step = all[i].joints - all[i - 1].joints;
+            Arc::make_mut(&mut all[i].condition).approach = std::array::from_fn(|j| side(i + j, step[j]));
+        }
+        matched(all).notes.iter().filter(|note| note.contains("sides of approach")).count()
+    };
+    let direction = |step: f64| if step > 0.0 { 1 } else { -1 };
+    assert_eq!(notes(&|_, step| -direction(step)), 0);
+    assert_eq!(notes(&|k, _| if k % 2 == 0 { 1 } else { -1 }), 0);
+    assert_eq!(notes(&|_, step| direction(step)), 1);
+}
