@@ -170,9 +170,22 @@ impl Walk {
         places.into_iter().flat_map(|place| self.beside(sheet, place, rng)).collect()
     }
 
+    /// Whether the path turns sharply at a row.
+    fn turns_at(&self, row: usize) -> bool {
+        let (Some(before), Some(next)) = (row.checked_sub(1), self.visits.get(row + 1)) else { return false };
+        let [before, at, next] =
+            [&self.visits[before].q, &self.visits[row].q, &next.q].map(|q| Vector6::from(*q));
+        let (came, goes) = (at - before, next - at);
+        came.dot(&goes) < 0.8 * came.norm() * goes.norm()
+    }
+
     /// One fresh place with what leads there and away. `place` counts rows.
     fn beside(&self, sheet: &Sheet, place: f64, rng: &mut impl Rng) -> Vec<Visit> {
-        let (low, share) = (place.floor() as usize, place.fract());
+        let low = place.floor() as usize;
+        // At the end of a line stands a row, in every run of the path.
+        let at_end = self.design == Design::Raster && (low..=low + 1).any(|row| self.turns_at(row));
+        let place = if at_end { place.floor() } else { place };
+        let share = place.fract();
         let (a, b) = (&self.visits[low], &self.visits[low + 1]);
         let idle = self.pause.is_some_and(|p| p[0] >= a.hours && p[1] <= b.hours);
         let hours = if idle { a.hours } else { a.hours + share * (b.hours - a.hours) };

@@ -51,6 +51,8 @@ mod joint_scatter;
 mod unexplained;
 mod written_model;
 mod in_doubt;
+mod latency;
+mod path_speeds;
 mod law_error;
 mod sensor_causes;
 mod sensor_discrepancy;

@@ -14,6 +14,7 @@ use super::cause::Cause;
 use super::design::{Design, FullDesign, Linear, Projected};
 use super::extension::{Extended, Subject};
 use super::intervals::{self, ShiftScan};
+use super::latency;
 use super::nonlinear_springs;
 use super::order_spectrum;
 use super::score::{score_from, score_projected};
@@ -151,10 +152,10 @@ impl<'a> CandidateScores<'a> {
     }
 }
 
-/// The springs and plays of a fit with other constants than the catalogue's.
+/// The springs, plays and latencies of a fit with other constants than the catalogue's.
 fn variants(listed: &[Arc<Candidate>], subject: &Subject<'_>, fit: &Extended) -> Vec<Arc<Candidate>> {
     let of = |cause: &Cause| {
-        let Cause::Measurement(Disturbance { kind: Kind::Empirical(fault), profile, .. }) = cause else {
+        let Cause::Measurement(Disturbance { kind: Kind::Empirical(fault), profile, values }) = cause else {
             return Vec::new();
         };
         let same = listed.iter().filter(|c| c.cause.is_same_finding(cause));
@@ -169,7 +170,13 @@ fn variants(listed: &[Arc<Candidate>], subject: &Subject<'_>, fit: &Extended) ->
             );
             Arc::new(Candidate { tried, ..candidate })
         };
-        nonlinear_springs::variants(*fault, subject).into_par_iter().map(candidate).collect::<Vec<_>>()
+        let delay_s = values.first().copied().unwrap_or(0.0);
+        let laws = nonlinear_springs::variants(*fault, subject).into_iter().chain(latency::variants(
+            *fault,
+            delay_s,
+            &subject.observed.dataset,
+        ));
+        laws.collect::<Vec<_>>().into_par_iter().map(candidate).collect::<Vec<_>>()
     };
     fit.causes.iter().flat_map(of).collect()
 }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
 use super::design::{Design, Slopes};
 use super::extension::Subject;
+use super::latency;
 use super::nonlinear_springs;
 use crate::identification::calibration::{
     Frames, LoadedRows, joint_rotations, motions_by_links, sensor_shifts, sensor_turns,
@@ -624,15 +625,6 @@ fn range(subject: &Subject<'_>) -> EmpiricalFault {
     EmpiricalFault::Range { from_mm, to_mm }
 }
 
-/// A latency, its drift relative to the middle of the logged times.
-fn latency(dataset: &Dataset) -> EmpiricalFault {
-    let times = dataset.rows.iter().filter_map(|row| row.condition.time_h).filter(|t| t.is_finite());
-    let (first, last) =
-        times.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), t| (first.min(t), last.max(t)));
-    let middle_s = 0.5 * (first + last) * 3600.0;
-    EmpiricalFault::Latency { middle_s: if middle_s.is_finite() { middle_s.round() as i64 } else { 0 } }
-}
-
 /// Time from row to row from which an arm may have stopped at each (h): stopping, settling and reading take some seconds.
 const STOP_H: f64 = 2.0 / 3600.0;
 
@@ -651,9 +643,9 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     let dataset = &subject.observed.dataset;
     let mut out = Vec::new();
     let has =
-        |rate: bool| dataset.rows.iter().any(|r| r.motion().is_some_and(|m| !rate || m.rate_per_h.is_some()));
+        |rate: bool| dataset.rows.iter().any(|r| r.motion().is_some_and(|m| !rate || m.rates.is_some()));
     if has(true) {
-        out.push((latency(dataset), 1.0));
+        out.push((latency::fault(dataset), 1.0));
     }
     // Also on a path with a clock, if rows are so far apart that the arm may have stopped at each: then it has no speed there, but a last
     // step.

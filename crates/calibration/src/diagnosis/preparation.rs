@@ -9,6 +9,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 
 use super::halves::is_path;
+use super::path_speeds;
 use crate::identification::fit::Observations;
 use crate::identification::rounding::{NotFused, ReadoutFusion};
 use crate::measurement::dataset::{Dataset, Motion};
@@ -114,9 +115,14 @@ fn fill_motion(dataset: &mut Dataset) {
             continue;
         }
         let step = rows[i].0 - rows[i - 1].0;
+        let rate = |from: usize, to: usize| {
+            let hours = rows[to].1.zip(rows[from].1).map(|(b, a)| b - a).filter(|h| path && *h > 0.0)?;
+            Some((rows[to].0 - rows[from].0) / hours)
+        };
         let next = (i + 1).min(n - 1);
-        let hours = rows[next].1.zip(rows[i - 1].1).map(|(b, a)| b - a).filter(|h| path && *h > 0.0);
-        let rate_per_h = hours.map(|h| (rows[next].0 - rows[i - 1].0) / h);
-        row.extra_mut().motion = Some(Motion { step, rate_per_h });
+        let into = |k: usize| (1..n).contains(&k).then(|| rate(k - 1, k)).flatten();
+        let rates = rate(i - 1, next)
+            .map(|mean| path_speeds::rates(mean, [into(i - 1), into(i), into(i + 1), into(i + 2)]));
+        row.extra_mut().motion = Some(Motion { step, rates });
     }
 }

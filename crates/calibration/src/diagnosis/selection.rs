@@ -13,6 +13,7 @@ use super::cause::Cause;
 use super::design::Design;
 use super::extension::{Extended, FreeParameters, Subject, fit, warm_fit};
 use super::held_out::FoldErrors;
+use super::latency;
 use super::levels;
 use super::nonlinear_springs;
 use super::score::{Score, score};
@@ -276,11 +277,13 @@ pub(super) fn contains_cause(causes: &[Cause], candidate: &Cause) -> bool {
     })
 }
 
-/// Whether `causes` contains the law of a spring or a play with any constants: two that differ in these alone would be the law of neither.
+/// Whether `causes` contains the law of a spring, a play or a latency with any constants: two that differ in these alone would be the law of neither.
 fn has_law_of(causes: &[Cause], candidate: &Cause) -> bool {
     causes.iter().any(|c| match (c, candidate) {
         (Cause::Measurement(a), Cause::Measurement(b)) => match (&a.kind, &b.kind) {
-            (Kind::Empirical(a), Kind::Empirical(b)) => nonlinear_springs::is_one_law(*a, *b),
+            (Kind::Empirical(a), Kind::Empirical(b)) => {
+                nonlinear_springs::is_one_law(*a, *b) || latency::is_one_law(*a, *b)
+            }
             _ => false,
         },
         _ => false,

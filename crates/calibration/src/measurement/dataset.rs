@@ -3,7 +3,7 @@
 mod row;
 mod rows;
 
-pub use self::row::{Extra, Motion, PathPoint, Reading, Row};
+pub use self::row::{Extra, Motion, PathPoint, Rates, Reading, Row};
 pub use self::rows::{Iter, Rows};
 use truegrind_arm::condition::Condition;
 pub use truegrind_arm::sensor::Sensor;

@@ -8,6 +8,7 @@ pub(crate) mod simulator;
 pub(crate) mod scenarios;
 mod along_turn;
 mod certain;
+mod path_speeds;
 mod play_flanks;
 mod decision;
 mod doubts;

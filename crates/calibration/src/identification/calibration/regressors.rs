@@ -8,7 +8,7 @@ use super::frames::Frames;
 use super::sensor_motion::sensor_motions;
 use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
-use crate::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault, second_degree};
+use crate::measurement::sensor::empirical::{AssumedLoad, CornerSpeed, EmpiricalFault, second_degree};
 
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
@@ -31,11 +31,15 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
     let rows = &dataset.rows;
     let none = || -> [Option<Vec<f64>>; 6] { Default::default() };
     match fault {
-        EmpiricalFault::Latency { middle_s } => {
+        EmpiricalFault::Latency { middle_s, corners } => {
             let rates: Vec<Vector6<f64>> = rows
                 .iter()
                 .map(|r| {
-                    let rate = r.motion().and_then(|m| m.rate_per_h);
+                    let rate = r.motion().and_then(|m| m.rates).map(|rates| match corners {
+                        CornerSpeed::Before => rates.before,
+                        CornerSpeed::After => rates.after,
+                        CornerSpeed::Mean => rates.mean,
+                    });
                     rate.map_or_else(Vector6::zeros, |rate| model.joint_map * rate / HOUR_S)
                 })
                 .collect();

@@ -35,8 +35,31 @@ impl Reading {
 pub struct Motion {
     /// Joint angles less those of the row before (rad).
     pub step: Joints,
-    /// Joint speeds where the rows are a path with a clock (rad/h).
-    pub rate_per_h: Option<Joints>,
+    /// Joint speeds where the rows are a path with a clock.
+    pub rates: Option<Rates>,
+}
+
+/// Joint speeds at a row of a path (rad/h).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rates {
+    /// From the row before to the next.
+    pub mean: Joints,
+    /// Where the path turns sharply, those with which the arm came; elsewhere the mean.
+    pub before: Joints,
+    /// Where the path turns sharply, those with which it went on; elsewhere the mean.
+    pub after: Joints,
+}
+
+impl Rates {
+    /// Those of a row at which the path does not turn sharply.
+    pub fn steady(mean: Joints) -> Self {
+        Self { mean, before: mean, after: mean }
+    }
+
+    /// Whether the path turns so sharply here that the arm has the mean of its speeds at no time.
+    pub fn is_corner(&self) -> bool {
+        self.before != self.mean || self.after != self.mean
+    }
 }
 
 /// Sampling point of a row on a measured path. The path is run in several cycles and read at the same sampling points in each.

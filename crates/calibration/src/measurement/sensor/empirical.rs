@@ -75,6 +75,18 @@ pub enum Overturning {
     Lumps,
 }
 
+/// The speeds that a latency has at corners of a path, where they change from row to row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CornerSpeed {
+    /// Those from the row before to the next.
+    Mean,
+    /// Those from the row before: the reading is of an earlier pose.
+    Before,
+    /// Those to the next row: the reading is of a later pose.
+    After,
+}
+
 /// An empirical fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -84,6 +96,8 @@ pub enum EmpiricalFault {
         /// t₀, the middle of the measurement (s), so that τ₀ is the mean delay wherever the clock of the rows begins. It is part of
         /// the fault, not of the rows: subsets of the rows must see the same regressors.
         middle_s: i64,
+        /// The speeds at corners of the path.
+        corners: CornerSpeed,
     },
     /// The arm has not settled: each joint still has a fraction of its last step to go. Drives settle at different rates.
     ArmUnsettled,

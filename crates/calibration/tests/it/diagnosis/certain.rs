@@ -74,18 +74,35 @@ fn path(delay_s: f64, rows: usize) -> Dataset {
 }
 
 fn path_of(arm: &Model, delay_s: f64, rows: usize) -> Dataset {
-    let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let target = nalgebra::Point3::new(20.0, -30.0, 80.0);
-    let joints = |t: f64| {
+    read_late(arm, delay_s, rows, &|t| {
         Joints::from_fn(|j, _| {
             let k = j as f64;
             0.5 * (0.11 * t * (1.0 + 0.31 * k) + k).sin()
                 + 0.35 * (0.23 * t * (1.0 + 0.17 * k) + 2.0 * k).cos()
         })
-    };
+    })
+}
+
+/// Time from row to row of a path (s).
+const INTERVAL_S: f64 = 0.25;
+
+/// Lines of 20 rows, to and fro beside each other: at their ends every joint turns back.
+fn raster(row: usize) -> Joints {
+    let (line, place) = (row / 20, row % 20);
+    let along = if line % 2 == 0 { place } else { 19 - place } as f64 / 19.0 - 0.5;
+    Joints::from_fn(|j, _| {
+        let k = j as f64;
+        0.5 * (0.9 * line as f64 * (1.0 + 0.23 * k) + k).sin()
+            + 0.6 * along * (0.4 * line as f64 + 1.3 * k).cos()
+    })
+}
+
+fn read_late(arm: &Model, delay_s: f64, rows: usize, joints: &dyn Fn(f64) -> Joints) -> Dataset {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let target = nalgebra::Point3::new(20.0, -30.0, 80.0);
     let rows: Vec<Row> = (0..rows)
         .map(|number| {
-            let t = 0.25 * number as f64;
+            let t = INTERVAL_S * number as f64;
             let at = (arm.forward(&joints(t - delay_s), &Condition::default()) * target).coords;
             let noise = Vector3::from_fn(|_, _| 0.02 * normal(&mut rng));
             let mut row = Row::new(number, joints(t), Reading::Position(at + noise));
@@ -144,6 +161,31 @@ fn a_reading_that_is_late_is_told_with_its_delay() {
     assert!((delay.value.abs() - 0.02).abs() < 4.0 * delay.sigma.unwrap() + 1e-4, "{delay:?}");
     assert!(late.worth_mm.unwrap() > 0.1, "{:?}", late.worth_mm);
     assert!(found.estimated.model.effects.is_empty(), "a fault of the measurement is left behind");
+}
+
+/// At the end of a line the arm has no speed between those of its two directions: with such a speed, a reading there is off by as much as the arm
+/// goes in the delay, and looks like an outlier.
+#[test]
+fn a_late_reading_where_a_path_turns_back_is_no_outlier() {
+    let straight = |t: f64| {
+        let place = (t / INTERVAL_S).max(0.0);
+        let row = place.floor();
+        raster(row as usize).lerp(&raster(row as usize + 1), place - row)
+    };
+    for delay_s in [0.05, -0.05] {
+        let dataset = read_late(&arm(), delay_s, 800, &straight);
+        let found = diagnosed(&dataset);
+        let first = &found.diagnosis.findings[0];
+        assert_eq!(
+            (first.effect.as_str(), first.confidence),
+            ("latency", Confidence::Identified),
+            "{delay_s}"
+        );
+        assert!(found.set_aside.is_empty(), "{delay_s}: {:?}", found.set_aside);
+        let late = &first.parameters[0];
+        assert!((late.value + delay_s).abs() < 4.0 * late.sigma.unwrap() + 1e-4, "{late:?}");
+        assert!(found.diagnosis.fits.extended.cv_rmse_mm < 1.15 * 0.02 * 3_f64.sqrt());
+    }
 }
 
 #[test]

@@ -14,9 +14,11 @@ use truegrind_arm::link::{Link, LinkModel};
 use truegrind_arm::model::{Body, Joints, Limits, Model};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter, link_parameters};
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
-use truegrind_calibration::measurement::dataset::{Dataset, Motion, Reading, Row, Sensor};
+use truegrind_calibration::measurement::dataset::{Dataset, Motion, Rates, Reading, Row, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use truegrind_calibration::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault, Overturning, Pole};
+use truegrind_calibration::measurement::sensor::empirical::{
+    AssumedLoad, CornerSpeed, EmpiricalFault, Overturning, Pole,
+};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::difference;
 use truegrind_math::lanes::{Instructions, with_instructions};
@@ -106,7 +108,8 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
             let anchor = if sensor == Sensor::Cable { number % 2 } else { 0 };
             let mut row = Row::new(number, joints, reading);
             (row.condition, row.anchor) = (condition.into(), anchor);
-            row.extra_mut().motion = Some(Motion { step: joints * 0.3, rate_per_h: Some(joints * 700.0) });
+            row.extra_mut().motion =
+                Some(Motion { step: joints * 0.3, rates: Some(Rates::steady(joints * 700.0)) });
             row
         })
         .collect();
@@ -176,7 +179,7 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
         _ => [EmpiricalFault::SensorAxes, EmpiricalFault::TargetNest { second: true }, EmpiricalFault::Lens],
     };
     let of_motion = [
-        EmpiricalFault::Latency { middle_s: 900 },
+        EmpiricalFault::Latency { middle_s: 900, corners: CornerSpeed::Before },
         EmpiricalFault::ArmUnsettled,
         EmpiricalFault::SensorUnsettled,
     ];
@@ -464,7 +467,8 @@ fn late_readings_do_not_hang_on_where_the_clock_begins() {
             let time_h = row.condition.time_h.map(|t| t + f64::from(begins_h));
             row.condition = Condition { time_h, ..*row.condition }.into();
         }
-        let form = EmpiricalFault::Latency { middle_s: 900 + 3600 * i64::from(begins_h) };
+        let middle_s = 900 + 3600 * i64::from(begins_h);
+        let form = EmpiricalFault::Latency { middle_s, corners: CornerSpeed::Mean };
         let mut late = Disturbance::new(Kind::Empirical(form), Profile::Constant);
         late.values = vec![0.05, 0.2];
         let frames = Frames { disturbances: vec![late], ..Frames::at_origin(0) };
