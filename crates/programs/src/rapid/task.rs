@@ -294,6 +294,13 @@ impl<'a, 's> ListingBuilder<'a, 's> {
         let bodies = self.symbols.bodies.clone();
         let routines = 0..self.symbols.routines.len() as u32;
         self.mains = routines.filter(|&routine| self.symbols.is_main(self.trees, routine)).collect();
+        if self.mains.len() > 1 {
+            let head = |routine: &u32| {
+                let scope = &self.symbols.routines[*routine as usize];
+                self.place(scope.file, scope.head.name)
+            };
+            self.listing.mains = self.mains.iter().map(head).collect();
+        }
         self.passed_data = parameters::of(self.trees, self.symbols, &self.mains);
         self.wrappers = Arc::new(Wrappers::of(self.trees, self.symbols, &self.mains));
         // Exit switches of callees first, however long the chain of calls is.
