@@ -1,5 +1,5 @@
 //! `cargo run --release -p truegrind-differential --example differential -- COUNT [--seed S] [--only LANGUAGE] [--one N]
-//! [--without effects,taught,borders] [--with placed,mapped,loose] [--show N]`
+//! [--without effects,taught,borders] [--with placed,mapped,loose,wrapped] [--show N]`
 //!
 //! COUNT corrected executions in all, over all languages or one. Ends with 1 where anything disagrees.
 
@@ -32,6 +32,7 @@ fn main() -> ExitCode {
         placed: value("--with").unwrap_or("").contains("placed"),
         mapped: value("--with").unwrap_or("").contains("mapped"),
         loose: value("--with").unwrap_or("").contains("loose"),
+        wrapped: value("--with").unwrap_or("").contains("wrapped"),
     };
     let seed = number("--seed").unwrap_or(0);
     if let Some(one) = number("--one") {

@@ -85,6 +85,8 @@ pub struct Plan {
     pub is_overloaded: bool,
     /// Whether a corrected motion has a tool whose tip lies behind the flange, within the wrist.
     pub has_tip_in_wrist: bool,
+    /// Whether a tool or work object has no stated origin and was taken as exact.
+    pub assumes_origins: bool,
     /// Steps between corrected motions and neighbours that are left; known once the program is rewritten.
     pub steps: Option<StepsToLeft>,
     /// How the position of each work object was treated.

@@ -515,6 +515,8 @@ pub struct Listing {
     /// Where the program decides by the position that the robot reads (CRobT) and may stand at the end of a motion that is corrected all the
     /// same (RAPID).
     pub position_decisions: Vec<Place>,
+    /// The procedures `main` of the files, where there are several: a controller loads one task with one (RAPID).
+    pub mains: Vec<Place>,
     /// Regions that could not be parsed.
     pub opaque: Vec<OpaqueRegion>,
     /// The marks of earlier compensations, per file.
@@ -544,8 +546,21 @@ pub struct NcFacts {
     pub external_calls: Vec<u32>,
     /// Motions behind a label, a jump, a call or a loop that are left because words are missing there, with these words.
     pub unstated: BTreeMap<u32, String>,
+    /// Work offsets and tools that the program sets to another value than the cell file or a comment states, by where it does.
+    pub replaced_frames: BTreeMap<Place, ReplacedFrame>,
     /// Words of orientation at the ends of motions where they are near a pole of their convention.
     pub at_poles: BTreeMap<u32, WordsAtPole>,
+}
+
+/// A work offset or tool that a program sets to another value than is stated beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReplacedFrame {
+    /// Its name (`G54`, `T1`).
+    pub name: String,
+    /// What the program sets.
+    pub set: Frame,
+    /// What the cell file or a comment states.
+    pub stated: Frame,
 }
 
 /// An offset of a target by persistent data, which stay on the controller when the program ends: an operator or another task may change

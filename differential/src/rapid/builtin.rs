@@ -338,6 +338,7 @@ impl Run<'_> {
         let motion = Motion {
             wrist,
             at,
+            calls: self.calls.clone(),
             way,
             goals,
             tool: (tool_name, held, frame_of_tool),

@@ -85,6 +85,8 @@ struct Maker<'a> {
     labels: usize,
     /// Names of loops that run.
     loops: usize,
+    /// Whether the routines are in a file of their own.
+    apart: bool,
 }
 
 /// Makes a program. `taught`: with a tool or an object that was taught.
@@ -105,6 +107,7 @@ pub fn program(rng: &mut ChaCha8Rng, case: &Case, features: Features, taught: bo
         features,
         labels: 0,
         loops: 0,
+        apart: false,
     };
     maker.cell();
     let mut made = Made {
@@ -381,6 +384,7 @@ impl Maker<'_> {
     fn write(&mut self, made: &mut Made) {
         let data = self.data();
         let apart = self.chance(0.25);
+        self.apart = apart;
         let mut main = String::from("PROC main()\n");
         if self.chance(0.35) {
             main.push_str("CONNECT int1 WITH trAdd;\nISignalDI distart,high,int1;\n");

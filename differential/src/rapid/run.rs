@@ -111,6 +111,8 @@ pub type Load = (f64, [f64; 3]);
 pub struct Motion {
     /// File and byte of its statement.
     pub at: (usize, usize),
+    /// Those of the calls around it, the outermost first.
+    pub calls: Vec<(usize, usize)>,
     /// How it goes.
     pub way: Way,
     /// The circle point, then the end.
@@ -161,6 +163,8 @@ pub struct Run<'a> {
     seed: u64,
     in_function: usize,
     depth: usize,
+    /// File and byte of the calls that run, the outermost first.
+    pub(super) calls: Vec<(usize, usize)>,
     traps: Vec<(Rc<Routine>, usize)>,
     pub(super) asleep: bool,
     in_trap: bool,
@@ -201,6 +205,7 @@ impl<'a> Run<'a> {
             seed,
             in_function: 0,
             depth: 0,
+            calls: Vec::new(),
             traps: Vec::new(),
             asleep: false,
             in_trap: false,

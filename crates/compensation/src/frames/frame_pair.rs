@@ -97,6 +97,11 @@ impl FrameNote {
         Self { said, taught: None }
     }
 
+    /// Whether it is that the frame has no stated origin and was taken as exact.
+    pub(crate) fn is_assumed(&self) -> bool {
+        self.taught.is_some()
+    }
+
     /// One sentence for each assumption: the pairs of one tool with several work objects have estimates at different places, of which the
     /// largest counts.
     pub(crate) fn sentences<'n>(notes: impl Iterator<Item = &'n FrameNote>) -> Vec<String> {

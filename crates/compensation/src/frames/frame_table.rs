@@ -239,6 +239,11 @@ impl FrameTable {
         taught.map(|(_, object)| *object).collect()
     }
 
+    /// Whether a tool or work object has no stated origin and was taken as exact.
+    pub(crate) fn assumes_origins(&self) -> bool {
+        self.list.iter().flat_map(|frames| &frames.notes).any(FrameNote::is_assumed)
+    }
+
     pub(crate) fn notes(&self) -> Vec<String> {
         let mut said = HashSet::new();
         let assumed = self.assumed.iter().filter(|note| said.insert(note.as_str())).cloned();

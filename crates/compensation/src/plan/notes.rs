@@ -14,7 +14,7 @@ use crate::target::solved_target::SolvedTargets;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::motion::load::Grip;
-use truegrind_programs::motion::{Listing, Motion, MotionKind, Origin, Place, Switch};
+use truegrind_programs::motion::{Frame, Listing, Motion, MotionKind, Origin, Place, ReplacedFrame, Switch};
 
 /// How backlash enters this program.
 pub(crate) fn backlash_note(arms: &Arms<'_>, solved: &SolvedTargets<'_>) -> Option<String> {
@@ -236,11 +236,15 @@ pub(crate) fn unchecked_notes(
             counted(listing.nc.external_calls.len(), "block calls another program", "blocks call another program")
         ));
     }
+    out.extend(several_mains_note(listing));
     out.extend(outside_calls_note(listing));
     out.extend(position_decisions_note(listing));
     out.extend(open_control_note(listing));
     out.extend(unstated_length_note(listing));
     out.extend(unstated_turn_note(listing));
+    out.extend(
+        listing.nc.replaced_frames.iter().map(|(place, frame)| replaced_frame_note(listing, *place, frame)),
+    );
     let curve = |m: &u32| {
         let motion = &listing.motions[*m as usize];
         motion.own_reason.is_none()
@@ -302,12 +306,39 @@ pub(crate) fn unstated_turn_note(listing: &Listing) -> Option<String> {
     ))
 }
 
+/// A work offset or tool that the program sets otherwise than the cell file or a comment states it.
+fn replaced_frame_note(listing: &Listing, place: Place, frame: &ReplacedFrame) -> String {
+    let ReplacedFrame { name, set, stated } = frame;
+    let [to, from] = [set.pose(), stated.pose()];
+    let text = |frame: &Frame| {
+        let [x, y, z] = frame.position_mm;
+        format!("[{x:.2}, {y:.2}, {z:.2}]")
+    };
+    let line = numbered(&listing.files, [place].into_iter()).unwrap_or_default();
+    format!(
+        "{name}: {line} sets it to {}, the cell file or a comment states {}: {:.2} mm and {:.3}° apart. Behind that line the motions in it are corrected          for what the program sets. Correct the one that is wrong, or leave its value out of the cell file",
+        text(set),
+        text(stated),
+        (to.translation.vector - from.translation.vector).norm(),
+        to.rotation.angle_to(&from.rotation).to_degrees()
+    )
+}
+
 /// Decisions by the position that the robot reads, at the end of motions that are corrected.
 fn position_decisions_note(listing: &Listing) -> Option<String> {
     let lines = numbered(&listing.files, listing.position_decisions.iter().copied())?;
     Some(format!(
         "the program decides by the position that the robot reads (CRobT, CPos, CJointT). After a corrected motion that is the corrected position: \
          check that each tolerance there is wider than the largest correction ({lines})"
+    ))
+}
+
+/// Files that are no modules of one task: each begins a program.
+fn several_mains_note(listing: &Listing) -> Option<String> {
+    let lines = numbered(&listing.files, listing.mains.iter().copied())?;
+    Some(format!(
+        "{} procedures main: a controller loads a task with one. The files were read as the modules of one task, so that their cuts were placed and          judged together; if they are separate programs, give --each ({lines})",
+        listing.mains.len()
     ))
 }
 

@@ -79,7 +79,15 @@ pub(super) fn planned(job: &Planner<'_>) -> Plan {
     let changes = changes.into_iter().filter_map(|change| change).collect();
     let unstated_axes = frame_table.unstated_axes.clone();
     let unknown_loads = unknown_loads(arms, options, &outcomes);
-    let mut plan = Plan { notes, changes, outcomes, unstated_axes, unknown_loads, ..Plan::default() };
+    let mut plan = Plan {
+        notes,
+        changes,
+        outcomes,
+        unstated_axes,
+        unknown_loads,
+        assumes_origins: frame_table.assumes_origins(),
+        ..Plan::default()
+    };
     plan.points.reserve_exact(chunks.iter().map(|p| p.points.len()).sum());
     for mut chunk in chunks {
         plan.points.append(&mut chunk.points);

@@ -141,6 +141,12 @@ impl<'s> Task<'s> {
         task.listing.nc.open_controls = open.filter_map(first).collect();
         task.listing.nc.unstated_lengths = task.unstated_lengths();
         task.listing.nc.unstated_turns = task.unstated_turns();
+        let Listing { nc, tools, work_objects, .. } = &mut task.listing;
+        let is_used = |name: &str| {
+            tools.iter().any(|tool| tool.name == name)
+                || work_objects.iter().any(|object| object.name == name)
+        };
+        nc.replaced_frames.retain(|_, replaced| is_used(&replaced.name));
         task
     }
 
@@ -412,6 +418,8 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.listing.nc.external_calls.retain(|call| (*call as usize) < motions);
         self.listing.nc.unstated.retain(|motion, _| (*motion as usize) < motions);
         self.listing.nc.at_poles.split_off(&(motions as u32));
+        let file = self.file;
+        self.listing.nc.replaced_frames.retain(|place, _| place.file != file);
         self.listing.predecessors.split_off(&(motions as u32));
         self.listing.speeds.truncate(speeds);
         self.listing.zones.truncate(zones);

@@ -117,6 +117,8 @@ pub(super) trait Visitor {
         state: &AbstractState,
         nesting: Nesting,
     ) -> Option<u32>;
+    /// The instruction of a call that is a motion, in the table: that of a routine whose only statement it is.
+    fn inlined_instruction(&self, body: Body, node: u32) -> Option<usize>;
     /// What holds at the end of a routine.
     fn exit_of(&mut self, routine: u32) -> Exit;
     /// A call of a routine of the program.
@@ -544,6 +546,12 @@ impl Interpreter<'_, '_, '_> {
         let known = if late || hidden { None } else { instruction::find(name) };
         let motion = self.visitor.visit_call(self.body, node, known, state, nesting);
         if let Some(known) = known {
+            self.transfer_motion_instruction(node, &INSTRUCTIONS[known], motion, state);
+            return;
+        }
+        if let Some(known) = self.visitor.inlined_instruction(self.body, node) {
+            self.invalidate_written(node, state);
+            self.invalidate_called(name, Syntax::Call, state);
             self.transfer_motion_instruction(node, &INSTRUCTIONS[known], motion, state);
             return;
         }

@@ -3,7 +3,7 @@
 //! Source: RAPID instructions reference (RobotWare 6) and, for process packages, their application manuals; argument
 //! orders of arc, force control, paint, spot and dispense instructions are confirmed by public programs.
 
-use super::token::fold;
+use super::token::{fold, same_name};
 use crate::motion::MotionKind;
 
 /// Meaning of a required argument.
@@ -303,4 +303,17 @@ pub fn find(name: &[u8]) -> Option<usize> {
         return None;
     }
     INSTRUCTIONS.iter().position(|instruction| instruction.name.as_bytes().eq_ignore_ascii_case(name))
+}
+
+/// The slot of a named argument.
+pub fn named_slot(name: &[u8]) -> Option<Slot> {
+    const NAMES: [(&[u8], Slot); 6] = [
+        (b"ToPoint", Slot::To),
+        (b"ToJointPos", Slot::To),
+        (b"CirPoint", Slot::Via),
+        (b"Speed", Slot::Speed),
+        (b"Zone", Slot::Zone),
+        (b"Tool", Slot::Tool),
+    ];
+    NAMES.iter().find(|(known, _)| same_name(name, known)).map(|&(_, slot)| slot)
 }

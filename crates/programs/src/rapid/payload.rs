@@ -71,7 +71,12 @@ pub(super) fn total_load(
 ) -> Option<Load> {
     let option = arguments(tree, motion)
         .find(|a| a.optional && a.name.is_some_and(|name| same_name(tree.text(name), b"TLoad")));
-    load(evaluator, context, option?.value?).filter(|total| total.mass_kg > NOTHING_KG)
+    total(evaluator, context, option?.value?)
+}
+
+/// The load that the value of `\TLoad` states, as [`total_load`] gives it.
+pub(super) fn total(evaluator: &Evaluator<'_, '_>, context: Context<'_>, value: Child) -> Option<Load> {
+    load(evaluator, context, value).filter(|total| total.mass_kg > NOTHING_KG)
 }
 
 /// A loaddata.

@@ -10,6 +10,7 @@ mod literals;
 mod motions;
 mod parameters;
 mod uses;
+mod wrappers;
 
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -27,11 +28,13 @@ use super::payload::{self, Gripped};
 use super::reaching_motions::ReachingMotions;
 use super::symbol::{Body, Symbols};
 use super::syntax::RapidTree;
+use super::token::same_name;
 use crate::dataflow::Nesting;
 use crate::motion::load::{Load, Loads};
 use crate::motion::{Listing, MotionTarget, OpaqueRegion, Place, Reason, Role};
 use call_edges::CallEdges;
 use literals::{Literals, NODES_PER_MOTION};
+use wrappers::{Inlined, Wrappers};
 
 /// The RAPID modules of one task, read together.
 #[derive(Debug)]
@@ -175,6 +178,8 @@ struct ListingBuilder<'a, 's> {
     mains: Vec<u32>,
     /// The data that every call hands over for a parameter.
     passed_data: parameters::PassedData,
+    /// The calls that are motions.
+    wrappers: Arc<Wrappers>,
     /// Whether a target expression of the current motion is impure, so that it must not be replaced.
     impure: bool,
     /// Whether the initial value of a declaration is impure.
@@ -236,6 +241,7 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             outside: vec![SwitchSet::EMPTY; symbols.bodies.len()],
             mains: Vec::new(),
             passed_data: parameters::PassedData::new(),
+            wrappers: Arc::default(),
             impure: false,
             impure_initials: HashMap::new(),
             literals: Vec::new(),
@@ -259,6 +265,17 @@ impl<'a, 's> ListingBuilder<'a, 's> {
         self.bodies.reserve(motions);
     }
 
+    /// The load that a call which is a motion states for tool and grip together.
+    fn inlined_load(&self, inlined: &Inlined, state: &AbstractState) -> Option<Load> {
+        let is_load = |given: &&wrappers::Given| {
+            let name = given.argument.name.map(|name| self.trees[given.named_in as usize].text(name));
+            given.argument.optional && name.is_some_and(|name| same_name(name, b"TLoad"))
+        };
+        let given = inlined.given.iter().find(is_load)?;
+        let context = Context::new(given.body.file, given.body.scope, &state.known);
+        payload::total(&self.evaluator, context, given.argument.value?)
+    }
+
     /// Interprets every body.
     fn interpret_bodies(&mut self) {
         self.reserve(
@@ -277,7 +294,15 @@ impl<'a, 's> ListingBuilder<'a, 's> {
         let bodies = self.symbols.bodies.clone();
         let routines = 0..self.symbols.routines.len() as u32;
         self.mains = routines.filter(|&routine| self.symbols.is_main(self.trees, routine)).collect();
+        if self.mains.len() > 1 {
+            let head = |routine: &u32| {
+                let scope = &self.symbols.routines[*routine as usize];
+                self.place(scope.file, scope.head.name)
+            };
+            self.listing.mains = self.mains.iter().map(head).collect();
+        }
         self.passed_data = parameters::of(self.trees, self.symbols, &self.mains);
+        self.wrappers = Arc::new(Wrappers::of(self.trees, self.symbols, &self.mains));
         // Exit switches of callees first, however long the chain of calls is.
         for &body in &self.symbols.callees_first {
             let Some(routine) = bodies[body as usize].routine else { continue };
@@ -293,6 +318,10 @@ impl<'a, 's> ListingBuilder<'a, 's> {
         }
         for (index, body) in bodies.iter().enumerate() {
             self.body = index as u32;
+            if let Some(routine) = body.routine.filter(|_| self.wrappers.is_unlisted(index as u32)) {
+                self.exits[routine as usize] = Some(self.exit_of(routine));
+                continue;
+            }
             let evaluator = Evaluator::new(self.trees, self.symbols);
             let exit = interpret_body(&evaluator, *body, self);
             if let Some(routine) = body.routine {
@@ -341,7 +370,9 @@ impl Visitor for ListingBuilder<'_, '_> {
         let tree = &self.trees[body.file as usize];
         let motion = match known {
             Some(known) => Some(self.table_motion(body, node, state, nesting, known)),
-            None => self.other_motion(body, node, state, nesting),
+            None => self
+                .inlined_motion(body, node, state, nesting)
+                .or_else(|| self.other_motion(body, node, state, nesting)),
         };
         let Some(motion) = motion else {
             self.record_outside_call(body, node);
@@ -356,11 +387,21 @@ impl Visitor for ListingBuilder<'_, '_> {
         self.bodies.push(self.body);
         if self.symbols.states_loads {
             self.grips.push(if state.reachable { state.gripped } else { Gripped::UNKNOWN });
-            let context = Context::new(body.file, body.scope, &state.known);
-            let total = payload::total_load(&self.evaluator, context, tree, node).filter(|_| state.reachable);
+            let total = match self.wrappers.motion(body.file, node) {
+                Some(inlined) => self.inlined_load(inlined, state),
+                None => {
+                    let context = Context::new(body.file, body.scope, &state.known);
+                    payload::total_load(&self.evaluator, context, tree, node)
+                }
+            };
+            let total = total.filter(|_| state.reachable);
             self.totals.extend(total.map(|total| (self.listing.motions.len() - 1, total)));
         }
         Some(self.listing.motions.len() as u32 - 1)
+    }
+
+    fn inlined_instruction(&self, body: Body, node: u32) -> Option<usize> {
+        self.wrappers.motion(body.file, node).map(|inlined| inlined.known)
     }
 
     fn exit_of(&mut self, routine: u32) -> Exit {

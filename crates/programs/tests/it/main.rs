@@ -15,6 +15,7 @@ mod modal_state;
 mod error_handlers;
 mod known_data;
 mod persistent;
+mod wrappers;
 mod writing;
 mod edits;
 mod nc;

@@ -73,6 +73,15 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
             "Corrected as if the turn about the tool vector were 0, but no word states it: state it, or A, B and C, before running the program",
         ),
         (
+            !listing.mains.is_empty(),
+            "Corrected as one task, but several files begin a program: if they are no modules of one task, give --each",
+        ),
+        (
+            !listing.nc.replaced_frames.is_empty(),
+            "Corrected, but the program sets a tool or work offset to another value than the cell file or a comment states: correct the one that \
+             is wrong before running the program",
+        ),
+        (
             depends_on_call(plan, listing),
             "Corrected, but a call of another program may change the modal state, and each NC program is read by itself: state it again after the \
              call, or check the motions there",
@@ -110,6 +119,11 @@ fn headline(plan: &Plan, listing: &Listing, is_written: bool) -> (Status, &'stat
     ];
     match warnings.into_iter().find(|(holds, _)| *holds) {
         Some((_, headline)) => (Status::Warning, headline),
+        None if is_written && plan.assumes_origins => (
+            Status::Good,
+            "All correctable motions are corrected: the program may run if tools and work objects whose origin nobody stated are exactly where it \
+             says",
+        ),
         None if is_written => (Status::Good, "All correctable motions are corrected: the program may run"),
         None => (Status::Good, "All correctable motions would be corrected; nothing was written"),
     }

@@ -11,7 +11,7 @@ use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_math::option_f64::OptionF64;
-use truegrind_programs::motion::{Listing, Mark, Reason};
+use truegrind_programs::motion::{Frame, Listing, Mark, Reason, ReplacedFrame};
 use truegrind_programs::rapid::Task;
 use truegrind_report::compensation::{self as view, ProgramFile};
 use truegrind_report::format::{csv, markdown, terminal};
@@ -313,6 +313,24 @@ fn verdict_and_page_tell_what_to_look_at() {
     turned.nc.unstated_turns = vec![listing.motions[0].place];
     let text = terminal::document(&view::summary(&plan, &turned, &files), 200);
     assert!(text.contains("[warning] Corrected as if the turn about the tool vector were 0"), "{text}");
+    let mut replaced = listing.clone();
+    let (set, stated) = (Frame::IDENTITY, Frame { position_mm: [0.0, 0.0, 10.0], ..Frame::IDENTITY });
+    let frame = ReplacedFrame { name: "G54".to_owned(), set, stated };
+    replaced.nc.replaced_frames.insert(listing.motions[0].place, frame);
+    let text = terminal::document(&view::summary(&plan, &replaced, &files), 200);
+    assert!(text.contains("[warning] Corrected, but the program sets a tool or work offset"), "{text}");
+    let mut several = listing.clone();
+    several.mains = vec![listing.motions[0].place; 2];
+    let text = terminal::document(&view::summary(&plan, &several, &files), 200);
+    assert!(text.contains("[warning] Corrected as one task, but several files begin a program"), "{text}");
+    let assumed = Plan { assumes_origins: true, ..plan.clone() };
+    let text = terminal::document(&view::summary(&assumed, &listing, &files), 200);
+    assert!(
+        text.contains(
+            "[ok] All correctable motions are corrected: the program may run if tools and work objects"
+        ),
+        "{text}"
+    );
     let last = listing.motions.len() as u32 - 1;
     for (call, is_depended_on) in [(0, true), (last, false)] {
         let mut called = listing.clone();

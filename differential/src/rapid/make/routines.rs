@@ -57,6 +57,29 @@ impl Maker<'_> {
         out.push_str(
             "TRAP trAdd\nn2:=n2+1;\npv2.trans.x:=pv2.trans.x+0.5;\nIF n2 MOD 3=0 b1:=NOT b1;\nENDTRAP\n",
         );
+        if self.features.wrapped {
+            self.wrappers(&mut out);
+        }
         out
+    }
+
+    /// Routines whose only statement is a motion on their parameters, or a call of such a routine.
+    fn wrappers(&mut self, out: &mut String) {
+        out.push_str(
+            "PROC wLine(robtarget goal,speeddata v,zonedata z,PERS tooldata t\\PERS wobjdata w)\nMoveL goal,v,z,t\\WObj?w;\nENDPROC\n\
+             LOCAL PROC wJoint(robtarget goal,speeddata v,zonedata z,PERS tooldata t,PERS wobjdata w)\nMoveJ \
+             goal,v,z,t\\WObj:=w;\nENDPROC\n\
+             PROC wArc(robtarget via,robtarget goal,speeddata v,zonedata z,PERS tooldata t,PERS wobjdata w)\nMoveC \
+             via,goal,v,z,t\\WObj:=w;\nENDPROC\n\
+             PROC wDeep(robtarget goal,PERS tooldata t\\PERS wobjdata w)\nwLine goal,v200,z5,t\\w?w;\nENDPROC\n",
+        );
+        let (tool, object) = self.names(self.pairs[1]);
+        out.push_str(&format!(
+            "PROC wHere(num unused,robtarget goal)\nMoveL goal,v50,fine,{tool}\\WObj:={object};\nENDPROC\n"
+        ));
+        let body = "MoveL goal,v,z,t\\WObj:=w;\nENDPROC\n";
+        out.push_str(&format!(
+            "PROC wKeep(robtarget goal,speeddata v,zonedata z,PERS tooldata t,PERS wobjdata w)\nVAR num k;\n{body}"
+        ));
     }
 }

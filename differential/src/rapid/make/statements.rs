@@ -105,6 +105,9 @@ impl Maker<'_> {
             pair = self.pair();
         }
         let (tool, object) = self.names(pair);
+        if self.features.wrapped && self.chance(0.5) {
+            return self.wrapped(out, &target, pair);
+        }
         let object = match object {
             "wobj0" if self.chance(0.7) => String::new(),
             other => self.pick(&["\\WObj:=", ",\\WObj:=", "\\wobj := "]).to_owned() + other,
@@ -129,6 +132,29 @@ impl Maker<'_> {
                 writeln!(out, "MoveAbsJ {joints}\\NoEOffs,{speed},{zone},{tool}{object};")
             }
             _ => writeln!(out, "MoveLDO {target},{speed},{zone},{tool}{object},doSpindle,1;"),
+        };
+    }
+
+    /// One motion by a routine that does nothing else.
+    fn wrapped(&mut self, out: &mut String, target: &str, pair: Pair) {
+        let (tool, object) = self.names(pair);
+        let speed = self.pick(&["v20", "v50", "[150,500,5000,1000]"]);
+        let zone = self.pick(&["fine", "fine", "z0", "z1", "z5"]);
+        // The routines of the file that holds them alone.
+        let local = if self.apart { "wLine" } else { "wJoint" };
+        let last = if self.apart { format!("\\w:={object}") } else { format!(",{object}") };
+        let _ = match self.rng.random_range(0..12) {
+            0..=3 if object == "wobj0" => writeln!(out, "wLine {target},{speed},{zone},{tool};"),
+            0..=3 => writeln!(out, "wLine {target},{speed},{zone},{tool}\\w:={object};"),
+            4 | 5 => writeln!(out, "{local} {target},{speed},{zone},{tool}{last};"),
+            6 => {
+                let via = self.target(pair);
+                writeln!(out, "wArc {via},{target},{speed},{zone},{tool},{object};")
+            }
+            7 | 8 => writeln!(out, "wDeep {target},{tool}\\w:={object};"),
+            9 => writeln!(out, "wLine goal:={target},z:={zone},v:={speed},t:={tool}\\w:={object};"),
+            10 => writeln!(out, "wHere {},{target};", self.amount()),
+            _ => writeln!(out, "wKeep {target},{speed},{zone},{tool},{object};"),
         };
     }
 

@@ -212,7 +212,10 @@ impl Run<'_> {
     fn call(&mut self, name: &str, arguments: &[Argument], at: (usize, usize), frame: &Frame) -> Ran<()> {
         if let Some(Symbol::Routine(routine, module)) = self.look(name, frame) {
             let scope = self.bind(&routine, module, arguments, frame)?;
-            self.routine(&routine, module, scope)?;
+            self.calls.push(at);
+            let ran = self.routine(&routine, module, scope);
+            self.calls.pop();
+            ran?;
             return Ok(());
         }
         self.instruction(name, arguments, at, frame)

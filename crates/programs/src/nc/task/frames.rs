@@ -10,8 +10,12 @@ use super::super::setup::{self, flange_tool};
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
 use super::{Block, Interpreter, StateEvent};
-use crate::motion::{Frame, Reason, Tool, WorkObject, WorkObjectValue, intern};
+use crate::motion::{Frame, Reason, ReplacedFrame, Tool, WorkObject, WorkObjectValue, intern};
 use truegrind_math::se3::Pose;
+
+/// Frames that differ by less are the same but for their last digit (mm, rad).
+const SAME_MM: f64 = 0.01;
+const SAME_RAD: f64 = 1e-4;
 
 impl Interpreter<'_, '_> {
     /// TRANS, ROT and their additive forms. True if the block is one of them.
@@ -170,7 +174,9 @@ impl Interpreter<'_, '_> {
             let pose = self.frame_expression(word).filter(|_| self.is_index_alone(word));
             // The active offset keeps its old value until it is selected again.
             self.state.work_offset.pending |= frame == self.state.work_offset.name;
-            self.assign_offset_value(&frame, pose.map(|pose| Frame::from_pose(&pose)));
+            let set = pose.map(|pose| Frame::from_pose(&pose));
+            self.note_replaced_offset(word.first, &frame, set);
+            self.assign_offset_value(&frame, set);
         } else if word.is("$P_PFRAME") {
             self.mark_programmable_frame_set();
             self.state.programmable_frame = self.frame_expression(word);
@@ -203,6 +209,13 @@ impl Interpreter<'_, '_> {
                 frame.position_mm[axis] = value;
                 frame
             });
+            // The other lengths may be set next.
+            let set = frame.and_then(|frame| {
+                let mut one = *self.tools.get(&setup::plain(&tool))?;
+                one.position_mm[axis] = frame.position_mm[axis];
+                Some(one)
+            });
+            self.note_replaced(word.first, &tool, set, self.tools.get(&setup::plain(&tool)).copied());
             self.state.tool.assigned.set(&tool, frame);
             self.pass.effects.assigned.tools |= self.is_conditional();
             self.tool_index.clear();
@@ -384,7 +397,30 @@ impl Interpreter<'_, '_> {
             Some(_) => known_value = false,
             None => {}
         }
-        self.without_moving(|this| this.assign_offset(name, known_value.then_some(frame)));
+        let set = known_value.then_some(frame);
+        // What is added to a stated value agrees with it.
+        if let Some(first) = block.words.first().filter(|_| absolute) {
+            self.note_replaced_offset(first.first, name, set);
+        }
+        self.without_moving(|this| this.assign_offset(name, set));
+    }
+
+    /// Notes a work offset that the program sets otherwise than it is stated.
+    fn note_replaced_offset(&mut self, token: u32, name: &str, set: Option<Frame>) {
+        let stated = self.frames.get(&setup::plain(name)).copied();
+        self.note_replaced(token, name, set, stated);
+    }
+
+    /// Notes a frame that the program sets at a token otherwise than it is stated.
+    fn note_replaced(&mut self, token: u32, name: &str, set: Option<Frame>, stated: Option<Frame>) {
+        let Some((set, stated)) = set.zip(stated) else { return };
+        let [a, b] = [set.pose(), stated.pose()];
+        let mm = (a.translation.vector - b.translation.vector).norm();
+        if mm > SAME_MM || a.rotation.angle_to(&b.rotation) > SAME_RAD {
+            let replaced = ReplacedFrame { name: name.to_owned(), set, stated };
+            let place = self.place(token);
+            self.listing.nc.replaced_frames.insert(place, replaced);
+        }
     }
 
     /// Notes whether a work offset has offsets of rotary axes, which its frame does not hold.

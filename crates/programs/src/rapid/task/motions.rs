@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::wrappers::Given;
 use super::{ListingBuilder, Literal, literals};
 use crate::dataflow::Nesting;
 use crate::motion::{
@@ -11,7 +12,7 @@ use crate::motion::{
 use crate::rapid::evaluate::Context;
 use crate::rapid::evaluate::target::ValueOrigin;
 use crate::rapid::flow::AbstractState;
-use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
+use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot, named_slot};
 use crate::rapid::predefined;
 use crate::rapid::symbol::computed_name::computed_name;
 use crate::rapid::symbol::{Body, SymbolKind};
@@ -156,24 +157,62 @@ impl ListingBuilder<'_, '_> {
         known: usize,
     ) -> Motion {
         let tree = &self.trees[body.file as usize];
+        let given = arguments(tree, node).map(|argument| Given { argument, named_in: body.file, body });
+        let count = arguments(tree, node).filter(|argument| !argument.optional).count();
+        let mut motion = self.motion_of((body, node, state), nesting, (known, count), given);
+        motion.instruction = self.name_of(known);
+        motion
+    }
+
+    /// A call of a routine whose only statement is a motion on its parameters. What is inserted before it would have to be another such call,
+    /// and another form of it another instruction: neither is written.
+    pub(super) fn inlined_motion(
+        &mut self,
+        body: Body,
+        node: u32,
+        state: &AbstractState,
+        nesting: Nesting,
+    ) -> Option<Motion> {
+        let wrappers = Arc::clone(&self.wrappers);
+        let inlined = wrappers.motion(body.file, node)?;
+        let count = inlined.given.iter().filter(|given| !given.argument.optional).count();
+        let given = inlined.given.iter().copied();
+        let mut motion = self.motion_of((body, node, state), nesting, (inlined.known, count), given);
+        let tree = &self.trees[body.file as usize];
+        motion.instruction = display(tree.text(tree.nodes.first(node))).into();
+        (motion.insertable, motion.can_straighten) = (false, false);
+        Some(motion)
+    }
+
+    /// The motion of an instruction of the table with these arguments, of which so many are required, but for its name.
+    fn motion_of(
+        &mut self,
+        (body, node, state): (Body, u32, &AbstractState),
+        nesting: Nesting,
+        (known, count): (usize, usize),
+        given: impl Iterator<Item = Given>,
+    ) -> Motion {
+        let trees = self.trees;
         let instruction: &Instruction = &INSTRUCTIONS[known];
         let mut motion = self.motion(body, node, state, nesting);
         self.impure = false;
-        motion.instruction = self.name_of(known);
         motion.kind = instruction.kind;
-        let count = arguments(tree, node).filter(|argument| !argument.optional).count();
         let (mut index, mut work_object) = (0, None);
+        // Whether all frames and the target stand in the call itself.
+        let mut is_here = true;
         let (mut velocity, mut time) = (None, None);
         let (mut targets, mut via) = (0, instruction.kind != MotionKind::Circular);
         let (mut to, mut tool) = (None, None);
         let mut options = Options::default();
-        for argument in arguments(tree, node) {
+        for Given { argument, named_in, body: home } in given {
+            let tree = &trees[named_in as usize];
             if argument.optional {
                 options.note(tree, argument);
+                let value = argument.value.map(|value| (home, value));
                 match argument.name.map(|name| tree.text(name)) {
-                    Some(name) if same_name(name, b"WObj") => work_object = argument.value,
-                    Some(name) if same_name(name, b"V") => velocity = argument.value,
-                    Some(name) if same_name(name, b"T") => time = argument.value,
+                    Some(name) if same_name(name, b"WObj") => work_object = value,
+                    Some(name) if same_name(name, b"V") => velocity = value,
+                    Some(name) if same_name(name, b"T") => time = value,
                     _ => {}
                 }
                 continue;
@@ -187,28 +226,30 @@ impl ListingBuilder<'_, '_> {
             match slot {
                 Some(Slot::To) => {
                     let joints = instruction.takes_joints();
-                    self.add_target(&mut motion, (body, node, state), value, joints, (Role::To, targets));
+                    self.add_target(&mut motion, (home, node, state), value, joints, (Role::To, targets));
                     (targets, to) = (targets + 1, Some(value));
+                    is_here &= home.node == body.node;
                 }
                 Some(Slot::Via) => {
-                    self.add_target(&mut motion, (body, node, state), value, false, (Role::Via, targets));
+                    self.add_target(&mut motion, (home, node, state), value, false, (Role::Via, targets));
                     (targets, via) = (targets + 1, true);
                 }
-                Some(Slot::Speed) => motion.speed = Some(self.speed(body, state, value)),
-                Some(Slot::Zone) => motion.zone = Some(self.zone(body, state, value)),
+                Some(Slot::Speed) => motion.speed = Some(self.speed(home, state, value)),
+                Some(Slot::Zone) => motion.zone = Some(self.zone(home, state, value)),
                 Some(Slot::Tool) => {
                     tool = Some(value);
-                    motion.tool = Some(self.tool(body, state, value));
+                    motion.tool = Some(self.tool(home, state, value));
+                    is_here &= home.node == body.node;
                 }
                 _ => {}
             }
         }
         motion.timed = options.timed;
-        if let (Some(speed), Some(velocity)) = (motion.speed, velocity) {
-            motion.speed = Some(self.overridden(speed, body, state, velocity));
+        if let (Some(speed), Some((home, velocity))) = (motion.speed, velocity) {
+            motion.speed = Some(self.overridden(speed, home, state, velocity));
         }
-        if let Some(time) = time {
-            let duration_s = self.evaluated(body, state, time).number();
+        if let Some((home, time)) = time {
+            let duration_s = self.evaluated(home, state, time).number();
             self.listing.durations_s.insert(self.listing.motions.len() as u32, duration_s);
         }
         let free =
@@ -218,10 +259,13 @@ impl ListingBuilder<'_, '_> {
             && instruction.kind == MotionKind::Circular
             && instruction.line_form().is_some_and(Instruction::splits);
         if tool.is_some() {
-            motion.work_object = Some(self.work_object(body, state, work_object));
+            let (home, value) = work_object.map_or((body, None), |(home, value)| (home, Some(value)));
+            motion.work_object = Some(self.work_object(home, state, value));
+            is_here &= home.node == body.node;
         }
         if motion.to().is_some_and(|to| to.value.is_err())
-            && self.follows_position(body, to, tool, work_object)
+            && is_here
+            && self.follows_position(body, to, tool, work_object.map(|(_, value)| value))
         {
             let to = motion.targets.iter_mut().rev().find(|target| target.role == Role::To);
             to.into_iter().for_each(|to| to.value = Err(Reason::CurrentPosition));
@@ -442,19 +486,6 @@ impl ListingBuilder<'_, '_> {
             _ => self.evaluator.type_of((body.file, body.scope), value).is_some_and(|t| t == type_name),
         }
     }
-}
-
-/// The slot of a named argument.
-fn named_slot(name: &[u8]) -> Option<Slot> {
-    const NAMES: [(&[u8], Slot); 6] = [
-        (b"ToPoint", Slot::To),
-        (b"ToJointPos", Slot::To),
-        (b"CirPoint", Slot::Via),
-        (b"Speed", Slot::Speed),
-        (b"Zone", Slot::Zone),
-        (b"Tool", Slot::Tool),
-    ];
-    NAMES.iter().find(|(known, _)| same_name(name, known)).map(|&(_, slot)| slot)
 }
 
 /// The optional arguments that decide whether a motion may be changed.

@@ -288,3 +288,44 @@ fn angles_are_not_taken_from_a_tool_that_is_turned_otherwise() {
     assert_eq!(reasons(Fanuc, &ways(straight, 2)).last(), Some(&None));
     assert_eq!(reasons(Fanuc, &ways(turned, 3)).last(), Some(&open));
 }
+
+/// The program's value is what the control uses, but one of the two is wrong; it was corrected for it without a word.
+#[test]
+fn a_frame_that_the_program_sets_otherwise_than_it_is_stated_is_listed() {
+    let replaced = |body: &str, dialect| {
+        let listing = listing_of(body, dialect);
+        let found = listing.nc.replaced_frames.iter();
+        found
+            .map(|(place, frame)| {
+                (place.line, frame.name.clone(), frame.set.position_mm, frame.stated.position_mm)
+            })
+            .collect::<Vec<_>>()
+    };
+    // Behind the three comments of the head.
+    let of = |line: u32, name: &str, set, stated| vec![(line, name.to_owned(), set, stated)];
+    let tool = "; truegrind tool T1 u [[0,0,100],[1,0,0,0]]\n";
+    let siemens = |set: &str| replaced(&format!("{tool}{set}\nT1 D1\nG54\nTRAORI\n{S}\n"), Siemens);
+    let stated = [500.0, 0.0, 0.0];
+    assert_eq!(siemens("G71\n$P_UIFR[1]=CTRANS(X,400)"), of(7, "G54", [400.0, 0.0, 0.0], stated));
+    assert_eq!(siemens("G71\n$P_UIFR[1]=CTRANS(X,500):CROT(Z,1)").len(), 1);
+    assert_eq!(siemens("G71\n$TC_DP3[1,1]=90"), of(7, "T1", [0.0, 0.0, 90.0], [0.0, 0.0, 100.0]));
+    // The same value, one that no motion uses, one that is not known.
+    for set in [
+        "G71\n$P_UIFR[1]=CTRANS(X,500.001)",
+        "G71\n$P_UIFR[2]=CTRANS(X,400)",
+        "G71\n$P_UIFR[1]=CTRANS(X,R1)",
+        "G71\n$TC_DP3[1,1]=100",
+        "G71",
+    ] {
+        assert_eq!(siemens(set), [], "{set}");
+    }
+    let linuxcnc =
+        |set: &str| replaced(&format!("G21 G90\n{set}\nG54 T0 M6 G43\nG1 X1 Y2 Z3 A180 B0 C0\n"), LinuxCnc);
+    assert_eq!(linuxcnc("G10 L2 P1 X400 Y0 Z0 R0"), of(6, "G54", [400.0, 0.0, 0.0], stated));
+    assert_eq!(linuxcnc("G10 L2 P1 Z7"), of(6, "G54", [500.0, 0.0, 7.0], stated));
+    assert_eq!(linuxcnc("G10 L2 P1 X500 Y0 Z0 R0"), []);
+    // What is added to a stated value agrees with it.
+    let fanuc = |set: &str| replaced(&format!("G21 G90\n{set}\nG90 G54 T0 M6\nG43.4 H0\n{F}\n"), Fanuc);
+    assert_eq!(fanuc("G10 L2 P1 X400. Y0. Z0."), of(6, "G54", [400.0, 0.0, 0.0], stated));
+    assert_eq!(fanuc("G91 G10 L2 P1 X1. Y0. Z0."), []);
+}
