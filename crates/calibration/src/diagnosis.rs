@@ -42,6 +42,7 @@ pub mod discrepancy;
 pub mod elimination;
 pub mod halves;
 pub mod marginal;
+mod odds;
 mod confirmation;
 pub mod contribution;
 mod play_flanks;

@@ -29,6 +29,7 @@ use super::halves::{HALVES, halves};
 use super::intervals::ShiftScan;
 use super::link_growth;
 use super::lump_direction;
+use super::odds;
 use super::overturning_masses;
 use super::pure_products::PureProducts;
 use super::score::{Score, score_columns, score_from, score_projected};
@@ -113,11 +114,7 @@ impl Confirmation {
                 "not significant once smooth unmodelled trends in time and pose are allowed for".to_owned(),
             );
         } else if self.margin < CLEAR_TWICE_LOG_BF {
-            // The margin is twice the logarithm of the Bayes factor.
-            let times = match (0.5 * self.margin.abs()).exp() {
-                times if times < 1000.0 => format!("{times:.1}"),
-                _ => "over 1000".to_owned(),
-            };
+            let times = odds::times(self.margin);
             out.push(if self.margin >= 0.0 {
                 format!("with smooth unmodelled trends allowed for, it is only {times} times as probable as a rival")
             } else {
