@@ -43,6 +43,7 @@ pub mod elimination;
 pub mod halves;
 pub mod marginal;
 mod odds;
+mod other_gravity;
 mod confirmation;
 pub mod contribution;
 mod play_flanks;

@@ -57,6 +57,8 @@ pub(super) struct Confirmation {
     pub changed: usize,
     /// Whether its size is physically plausible, and no other finding explains the same rows.
     pub plausible: bool,
+    /// Whether another direction of gravity explains what it does.
+    pub under_other_gravity: bool,
     /// Whether it is a compliance by which loads would lift the arm, as one does that hangs and is taken for one that stands.
     pub lifts: bool,
 }
@@ -85,6 +87,7 @@ impl Confirmation {
             && self.margin >= CLEAR_TWICE_LOG_BF
             && self.is_stable()
             && self.changed <= ALLOWED_FAILURES
+            && !self.under_other_gravity
     }
 
     /// Whether it is significant and plausible, confirmed or not.
@@ -108,6 +111,9 @@ impl Confirmation {
             );
         } else if !self.plausible {
             out.push("physically implausible size, or another finding explains the same rows".to_owned());
+        }
+        if self.under_other_gravity {
+            out.push("gravity along another direction explains these rows as well or better: see the note on the mounting".to_owned());
         }
         if !self.significant {
             out.push(
@@ -389,6 +395,7 @@ impl ConfirmationContext<'_> {
             recovered: 0,
             testable: 0,
             changed: 0,
+            under_other_gravity: false,
             plausible: own.candidate.cause.has_plausible_sign()
                 && self.is_under_weight(index)
                 && !self.is_confounded_with_lag(&own.candidate.cause)

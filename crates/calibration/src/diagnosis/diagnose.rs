@@ -13,6 +13,7 @@ use super::finding::{
 use super::handover::{Handover, WrittenModel, too_many_aside};
 use super::merged;
 pub use super::options::Options;
+use super::other_gravity::OtherGravity;
 use super::picture::Picture;
 use super::preparation::{Prepared, prepare};
 use super::residual_tests;
@@ -105,6 +106,7 @@ pub fn diagnose(
     let few_poses = needed.map(|needed| few_poses_note(dataset, needed));
     let mut notes: Vec<String> = few_poses.iter().cloned().collect();
     notes.append(&mut search.notes);
+    notes.extend(confirmed.other_gravity.as_ref().map(OtherGravity::note));
     if !search.set_aside.is_empty() {
         notes.extend(shifted_rows::note(dataset, &search.full_fit.model, &search.full_fit.frames));
     }
