@@ -179,7 +179,7 @@ impl<'a> Case<'a> {
             for variant in std::iter::once(self.dataset).chain(self.shifted.iter().map(|(_, other)| other)) {
                 checkpoint();
                 let rows: Vec<usize> = (first..first + size).collect();
-                let Some(found) = self.from_block(&variant.subset(&rows), nominal, min_rows) else {
+                let Some(found) = self.under_frames_of(&variant.subset(&rows), nominal, min_rows) else {
                     continue;
                 };
                 if best.as_ref().is_none_or(|(left, _)| found.0 < *left) {
@@ -191,7 +191,12 @@ impl<'a> Case<'a> {
     }
 
     /// The same under the frames of a block, concentrated on the rows that fit them best.
-    fn from_block(&self, block: &Dataset, nominal: &Model, min_rows: usize) -> Option<(usize, Vec<Run>)> {
+    fn under_frames_of(
+        &self,
+        block: &Dataset,
+        nominal: &Model,
+        min_rows: usize,
+    ) -> Option<(usize, Vec<Run>)> {
         let frames = self.fitted_frames(block, nominal)?;
         let errors = self.errors_mm(nominal, &frames);
         // Each row as it fits best.

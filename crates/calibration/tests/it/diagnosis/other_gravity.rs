@@ -54,7 +54,7 @@ fn a_wall_that_no_file_states_is_told_and_names_no_joint() {
 fn a_ceiling_that_no_file_states_is_told() {
     let yields = Hidden::Compliance { joint: 2, peak_rad: 0.0015 };
     for hidden in [PEDESTAL, yields] {
-        let found = diagnosed(&[hidden.clone()], PI, [0.0, 0.0, -1.0], 103);
+        let found = diagnosed(std::slice::from_ref(&hidden), PI, [0.0, 0.0, -1.0], 103);
         let note = note(&found).expect("a note on the mounting");
         assert!(note.contains("along +z"), "{note}");
         assert_eq!(self::note(&diagnosed(&[hidden], PI, [0.0, 0.0, 1.0], 103)), None);
