@@ -299,3 +299,17 @@ fn only_one_file_opens_files_and_only_one_prints() {
         assert!(may || prints.is_none(), "src/{file} has {}", prints.unwrap());
     }
 }
+
+/// Two roundings of it would make a load of a program weigh another than what it was fitted with. Simulators of tests are independent on purpose.
+#[test]
+fn the_number_of_gravity_stands_in_one_file() {
+    let mut found = Vec::new();
+    for (name, _) in USES {
+        for (file, text) in code(&root().join("crates").join(name).join("src")) {
+            if ["9.806", "9.81", "9_806", "9806"].iter().any(|number| text.contains(number)) {
+                found.push(format!("{name}/{file}"));
+            }
+        }
+    }
+    assert_eq!(found, ["arm/gravity.rs"]);
+}

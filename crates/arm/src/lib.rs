@@ -11,6 +11,7 @@
 //! rad, joint angles are the controller's unless a name says otherwise.
 
 pub mod bounds;
+pub mod gravity;
 pub mod link;
 pub mod condition;
 mod joints;

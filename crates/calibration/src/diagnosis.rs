@@ -42,6 +42,8 @@ pub mod discrepancy;
 pub mod elimination;
 pub mod halves;
 pub mod marginal;
+mod odds;
+mod other_gravity;
 mod confirmation;
 pub mod contribution;
 mod play_flanks;

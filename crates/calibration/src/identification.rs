@@ -16,6 +16,7 @@ pub(crate) mod parameter_table;
 pub mod repeats;
 mod sessions;
 mod cable_factor;
+pub(crate) mod shifted_rows;
 pub(crate) mod misreading;
 pub(crate) mod mixed_rows;
 pub(crate) mod rigid_motion_columns;

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use crate::chain::{Chain, cross, minus};
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
-use crate::effect::statics::{GRAVITY, Statics};
+use crate::effect::statics::Statics;
+use crate::gravity::STANDARD_GRAVITY;
 use crate::joints::MappedJoints;
 use crate::link_motion::LinkMotion;
 use truegrind_math::lanes::{Real, SinCos, splats};
@@ -206,7 +207,7 @@ impl BaseTilt {
     pub(super) fn largest_mm(&self, extent_mm: f64, mass_kg: f64) -> f64 {
         let newton_metres = |term: &TiltTerm| {
             let kg = if term.frame.is_some() { 1.0 } else { mass_kg };
-            kg * GRAVITY * 2e-3 * extent_mm
+            kg * STANDARD_GRAVITY * 2e-3 * extent_mm
         };
         let of = |term: &TiltTerm| {
             newton_metres(term) * (term.tilt_rad_per_nm.abs() * extent_mm + term.sway_mm_per_nm.abs())

@@ -13,7 +13,8 @@ use serde::{Deserialize, Serialize};
 use crate::chain::{Chain, cross, dot, minus, scaled};
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
-use crate::effect::statics::{GRAVITY, Statics};
+use crate::effect::statics::Statics;
+use crate::gravity::STANDARD_GRAVITY;
 use crate::joints::MappedJoints;
 use truegrind_math::lanes::{Real, SinCos, splats};
 
@@ -170,7 +171,7 @@ fn pull(statics: &Statics, lump: &Lump) -> [f64; 3] {
         None => statics.gravity_newton(),
         Some(axis) => {
             let mut along = [0.0; 3];
-            along[axis] = GRAVITY * 1e-3;
+            along[axis] = STANDARD_GRAVITY * 1e-3;
             along
         }
     }

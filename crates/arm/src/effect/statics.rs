@@ -5,6 +5,7 @@ use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 use crate::body::Body;
 use crate::chain::{self, Chain, LinkTable, cross, dot, minus};
 use crate::condition::Condition;
+use crate::gravity::STANDARD_GRAVITY;
 use crate::joints::MappedJoints;
 use crate::link::Link;
 use truegrind_math::lanes::{SinCos, sin_cos, splats};
@@ -19,9 +20,6 @@ pub struct Statics {
     /// The flange in the last frame.
     flange: Pose,
 }
-
-/// Standard gravity [m/s²].
-pub(super) const GRAVITY: f64 = 9.806_65;
 
 impl Statics {
     /// Statics of links without joint effects (their share in the torque is of second order), massless where the masses
@@ -93,7 +91,7 @@ impl Statics {
     #[inline(always)]
     pub(super) fn gravity_newton(&self) -> [f64; 3] {
         let g = &self.gravity;
-        [g.x * GRAVITY * 1e-3, g.y * GRAVITY * 1e-3, g.z * GRAVITY * 1e-3]
+        [g.x, g.y, g.z].map(|along| along * STANDARD_GRAVITY * 1e-3)
     }
 
     /// The frames at mapped angles `u`.

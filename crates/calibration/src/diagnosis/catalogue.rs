@@ -359,12 +359,7 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     }
     let lump = |frame, axis, moment| Lump { frame, axis, moment, factor: 0.0 };
     for joint in 0..5 {
-        let frames: &[usize] = match joint {
-            0 | 1 => &[2, 4, 6],
-            2 => &[4, 6],
-            _ => &[6],
-        };
-        let lumps: Vec<Lump> = frames.iter().map(|&frame| lump(frame, None, None)).collect();
+        let lumps: Vec<Lump> = lumped_frames(joint).iter().map(|&frame| lump(frame, None, None)).collect();
         effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: lumps.clone() }), 1.0));
         // The first moments of the links between complete the span of the static torques of any masses.
         if (1..4).contains(&joint) {
@@ -560,6 +555,33 @@ fn base_tilts(nominal: &Model) -> Vec<(EmpiricalFault, f64)> {
     let forms = [(None, false), (None, true), (Some(across), false), (Some(across), true)];
     let tried = forms.len() as f64;
     forms.iter().map(|&(axes, deep)| (EmpiricalFault::BaseTilt { load, axes, deep }, tried)).collect()
+}
+
+/// Deflections under the weight of the arm along its own direction of gravity: of joints, and of a base.
+pub(super) fn weight_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
+    let nominal = subject.nominal;
+    let lump = |frame| Lump { frame, axis: None, moment: None, factor: 0.0 };
+    let compliances = (0..5).map(|joint| match nominal.bodies {
+        Some(_) => Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 0.0 }),
+        None => {
+            let lumps = lumped_frames(joint).iter().map(|&frame| lump(frame)).collect();
+            Effect::LumpedCompliance(LumpedCompliance { joint, lump: lumps })
+        }
+    });
+    let tilts = base_tilts(nominal).into_iter().map(|(tilt, tried)| {
+        let cause = Cause::Measurement(Disturbance::new(Kind::Empirical(tilt), Profile::Constant));
+        Candidate { tried: EXPANSION_ODDS * tried, ..Candidate::of(&cause, subject) }
+    });
+    compliances.map(|effect| Candidate::of(&Cause::Arm(effect), subject)).chain(tilts).collect()
+}
+
+/// Ends of links at which lumps stand for masses beyond a joint: elbow, wrist, flange.
+fn lumped_frames(joint: usize) -> &'static [usize] {
+    match joint {
+        0 | 1 => &[2, 4, 6],
+        2 => &[4, 6],
+        _ => &[6],
+    }
 }
 
 /// Pairs of joints for two-joint gear errors.

@@ -29,6 +29,7 @@ use super::halves::{HALVES, halves};
 use super::intervals::ShiftScan;
 use super::link_growth;
 use super::lump_direction;
+use super::odds;
 use super::overturning_masses;
 use super::pure_products::PureProducts;
 use super::score::{Score, score_columns, score_from, score_projected};
@@ -56,6 +57,8 @@ pub(super) struct Confirmation {
     pub changed: usize,
     /// Whether its size is physically plausible, and no other finding explains the same rows.
     pub plausible: bool,
+    /// Whether another direction of gravity explains what it does.
+    pub under_other_gravity: bool,
     /// What its sign says, if that is the wrong one.
     pub wrong_sign: Option<WrongSign>,
 }
@@ -110,6 +113,7 @@ impl Confirmation {
             && self.margin >= CLEAR_TWICE_LOG_BF
             && self.is_stable()
             && self.changed <= ALLOWED_FAILURES
+            && !self.under_other_gravity
     }
 
     /// Whether it is significant and plausible, confirmed or not.
@@ -130,16 +134,15 @@ impl Confirmation {
         } else if !self.plausible {
             out.push("physically implausible size, or another finding explains the same rows".to_owned());
         }
+        if self.under_other_gravity {
+            out.push("gravity along another direction explains these rows as well or better: see the note on the mounting".to_owned());
+        }
         if !self.significant {
             out.push(
                 "not significant once smooth unmodelled trends in time and pose are allowed for".to_owned(),
             );
         } else if self.margin < CLEAR_TWICE_LOG_BF {
-            // The margin is twice the logarithm of the Bayes factor.
-            let times = match (0.5 * self.margin.abs()).exp() {
-                times if times < 1000.0 => format!("{times:.1}"),
-                _ => "over 1000".to_owned(),
-            };
+            let times = odds::times(self.margin);
             out.push(if self.margin >= 0.0 {
                 format!("with smooth unmodelled trends allowed for, it is only {times} times as probable as a rival")
             } else {
@@ -425,6 +428,7 @@ impl ConfirmationContext<'_> {
             recovered: 0,
             testable: 0,
             changed: 0,
+            under_other_gravity: false,
             plausible: own.candidate.cause.has_plausible_sign()
                 && self.is_under_weight(index)
                 && !self.is_confounded_with_lag(&own.candidate.cause)

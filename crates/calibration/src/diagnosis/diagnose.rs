@@ -13,6 +13,7 @@ use super::finding::{
 use super::handover::{Handover, WrittenModel, too_many_aside};
 use super::merged;
 pub use super::options::Options;
+use super::other_gravity::OtherGravity;
 use super::picture::Picture;
 use super::preparation::{Prepared, prepare};
 use super::residual_tests;
@@ -26,11 +27,12 @@ use crate::identification::benefit::Benefit;
 use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{
-    OUTLIER_SHARE, Observations, WRONG_ORIENTATION_RAD, frame_parameters, median_orientation_error,
+    OTHER_ARM_MM, OUTLIER_SHARE, Observations, WRONG_ORIENTATION_RAD, frame_parameters,
+    median_orientation_error,
 };
 use crate::identification::misreading;
-use crate::identification::misreading::OTHER_ARM_MM;
 use crate::identification::mixed_rows::{MixedRows, mixed_rows};
+use crate::identification::shifted_rows;
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Dataset;
@@ -104,6 +106,10 @@ pub fn diagnose(
     let few_poses = needed.map(|needed| few_poses_note(dataset, needed));
     let mut notes: Vec<String> = few_poses.iter().cloned().collect();
     notes.append(&mut search.notes);
+    notes.extend(confirmed.other_gravity.as_ref().map(OtherGravity::note));
+    if !search.set_aside.is_empty() {
+        notes.extend(shifted_rows::note(dataset, &search.full_fit.model, &search.full_fit.frames));
+    }
     let mut finding_of_cause = vec![0; search.searched_fit.causes.len()];
     for (index, merged) in summary.findings.iter().enumerate() {
         merged.causes.iter().for_each(|&k| finding_of_cause[k] = index);

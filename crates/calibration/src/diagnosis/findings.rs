@@ -15,6 +15,7 @@ use super::drift;
 use super::extension::{Extended, Subject};
 use super::finding::{Alternative, Confidence, Family, Finding, Gain, Step};
 use super::held_out::{FoldErrors, Reduced};
+use super::odds;
 use super::picture::{Picture, picture};
 use super::score::VISIBLE;
 use super::score::{non_centrality, score};
@@ -266,11 +267,11 @@ impl FindingBuilder<'_> {
             rows_in_file: None,
             joints: pendant(&cause.joints()),
             evidence: format!(
-                "{}: χ² falls by {:.0} for {} with everything else refitted; twice the log Bayes factor {:.0} with {} tried",
+                "{}: χ² falls by {:.0} for {} with everything else refitted; {}; {} tried",
                 words::describe_pattern(cause),
                 own.own.gain,
                 counted(own.own.estimate.len(), "parameter", "parameters"),
-                own.own.evidence,
+                odds::readings_with_it(own.own.evidence),
                 counted(own.tried.round() as usize, "variant", "variants"),
             ),
             parameters,

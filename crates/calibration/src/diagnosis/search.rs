@@ -9,6 +9,7 @@ use super::elimination::CORRELATED_NOISE;
 use super::extension::{Extended, FreeParameters, Subject, fit};
 use super::findings::short_name;
 use super::options::Options;
+use super::other_gravity::OtherGravity;
 use super::preparation::Prepared;
 use super::residual_tests::{self, Structure};
 use super::selection::{self, Accepted, Selection};
@@ -73,6 +74,8 @@ pub(super) struct Confirmed {
     pub(super) linear: Linear,
     pub(super) whole: FullDesign,
     pub(super) outcome: Confirmations,
+    /// That gravity seems to act along another direction than the robot file states.
+    pub(super) other_gravity: Option<OtherGravity>,
 }
 
 impl<'a> Search<'a> {
@@ -195,8 +198,15 @@ impl<'a> Search<'a> {
             sides_from_order: prepared.sides_from_order,
             raw: &whole.design,
         };
-        let outcome = confirming.outcome();
-        Confirmed { linear, whole, outcome }
+        let mut outcome = confirming.outcome();
+        let tried: Vec<f64> = self.accepted.iter().map(|accepted| accepted.tried).collect();
+        let is_plausible: Vec<bool> = outcome.confirmations.iter().map(|of| of.plausible).collect();
+        let other_gravity = OtherGravity::find(searched, &self.searched_fit, (&tried, &is_plausible), &whole);
+        for (confirmation, cause) in outcome.confirmations.iter_mut().zip(&self.searched_fit.causes) {
+            confirmation.under_other_gravity =
+                other_gravity.as_ref().is_some_and(|other| other.contradicts(cause));
+        }
+        Confirmed { linear, whole, outcome, other_gravity }
     }
 
     /// For serially correlated readings: purges the cross-validation, and drops shifts that are not confirmed.

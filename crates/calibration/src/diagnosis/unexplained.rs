@@ -4,6 +4,7 @@ use super::cause_kind::CauseKind;
 use super::discrepancy::{Discrepancy, typical_mm};
 use super::finding::{Confidence, Finding, Gain, too_much_for_noise};
 use super::joint_scatter::JointScatter;
+use super::odds;
 use super::residual_tests::{Structure, is_structure};
 use super::search::Confirmed;
 use super::something_else::{Field, RemainingAt, SomethingElse};
@@ -163,13 +164,14 @@ impl Unexplained<'_> {
     fn evidence(&self) -> String {
         let s = self.structure;
         let mut out = format!(
-            "random functions of time and pose in addition to the causes: twice the log Bayes factor {:.0}",
-            self.discrepancy.evidence
+            "random functions of time and pose in addition to the causes: {}",
+            odds::readings_with_it(self.discrepancy.evidence)
         );
         if let Some(scatter) = self.scatter() {
             out.push_str(&format!(
-                "; scatter about joint {}: twice the log likelihood ratio {:.0}",
+                "; scatter about joint {}: the residuals are {} times more probable with it (twice the log likelihood ratio {:.0})",
                 scatter.joint + 1,
+                odds::times(scatter.evidence),
                 scatter.evidence
             ));
         }

@@ -293,6 +293,10 @@ fn noise_sigmas(
     (mm, rad)
 }
 
+/// Error with only the frames fitted from which readings are of another arm, or in other units or columns (mm): the RMS for `identify`, the
+/// median for the beginning of a diagnosis, along each axis for a later series and for tracking.
+pub(crate) const OTHER_ARM_MM: f64 = 25.0;
+
 /// A row rejected as a gross outlier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlier {

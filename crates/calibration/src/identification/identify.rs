@@ -4,12 +4,11 @@ use thiserror::Error;
 
 use rayon::prelude::*;
 
-use super::misreading::OTHER_ARM_MM;
 use crate::identification::benefit::{Benefit, NoBenefit, benefit};
 use crate::identification::beyond_noise::{BeyondNoise, joint_errors_rad, longer_tool, mean_square_of};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
-    Fitted, OUTLIER_CUT, Observations, Outliers, Start, WRONG_ORIENTATION_RAD, errors_on, fit,
+    Fitted, OTHER_ARM_MM, OUTLIER_CUT, Observations, Outliers, Start, WRONG_ORIENTATION_RAD, errors_on, fit,
     frame_parameters, median_orientation_error, orientation_errors, outliers, summary_on,
 };
 use crate::identification::identifiability::Identifiability;
@@ -23,6 +22,7 @@ use crate::identification::repeats::Repeats;
 use crate::identification::rounded_log::{Asked, Rounding, spent};
 use crate::identification::rounding::{NotFused, ReadoutFusion, rounding_floor_mm};
 use crate::identification::sessions::set_up_anew;
+use crate::identification::shifted_rows;
 use crate::identification::solver::{Family, SOLVERS, Scope, Solver};
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
@@ -259,6 +259,9 @@ pub fn identify(
             .map(|benefit| benefit.with_unmodelled(beyond_noise))
     });
     let left_mm = summary_on(&observed, &geometry.model, &geometry.frames).rmse;
+    let shifted = (!outliers.rows.is_empty())
+        .then(|| shifted_rows::note(dataset, &geometry.model, &geometry.frames))
+        .flatten();
     let mixed = (!options.solver.as_printed)
         .then(|| mixed_rows(&observed, nominal, frames, &options.tolerance, left_mm))
         .flatten();
@@ -276,6 +279,7 @@ pub fn identify(
         longer_tool: longer_tool_of(&estimated, benefit.as_ref()),
         rounded_log: rounding.note(dataset.angle_step_rad, trained.geometry.held_out.rmse),
         mixed: mixed.as_ref().map(MixedRows::sentence),
+        shifted,
     };
     estimated.verdict = judge(&case, options);
     Ok(Identification {
@@ -683,6 +687,8 @@ struct VerdictInputs<'a> {
     rounded_log: Option<String>,
     /// That the rows are those of two arms.
     mixed: Option<String>,
+    /// That rows which were set aside are shifted.
+    shifted: Option<String>,
 }
 
 /// Share of the expected error from which what is beyond the noise is stated for longer tools.
@@ -762,6 +768,9 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     }
     if let Some(rounded_log) = &case.rounded_log {
         verdict.note(rounded_log.as_str());
+    }
+    if let Some(shifted) = &case.shifted {
+        verdict.note(shifted.as_str());
     }
     if case.outliers.too_many > 0 {
         verdict.note(format!(

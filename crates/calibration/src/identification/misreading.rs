@@ -2,30 +2,25 @@
 //! in another unit, a reading were missing, or each session had its own set-up.
 //!
 //! Each hypothesis is judged by the closed form for sensor frame and target with the nominal arm, since a wrong file is off by more than any
-//! arm's tolerance. Most are of tracker positions only: a cable's single length fits too much. Of a cable, counts in place of millimetres and readings
-//! that fall as it leaves are told: they are one factor for all lengths.
+//! arm's tolerance. Most are of positions, those of measured poses too: a cable's single length fits too much. Of a cable, counts in place of
+//! millimetres and readings that fall as it leaves are told, one factor for all lengths, and rows that are shifted.
 
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::cable_factor;
 use super::calibration::{CalibrationProblem, Frames, Weight};
+use super::fit::{Observations, WRONG_ORIENTATION_RAD, median_orientation_error};
+use super::shifted_rows;
 use super::start::candidate_frames;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::row_list::row_list;
 use truegrind_arm::model::{Joints, Model};
+use truegrind_math::se3::Pose;
 use truegrind_math::sentence::listed;
 use truegrind_math::statistics::median;
 
-/// Error with only the frames fitted from which readings are of another arm, or in other units or columns (mm): the RMS for `identify`, the
-/// median for the beginning of a diagnosis, along each axis for a later series and for tracking.
-pub(crate) const OTHER_ARM_MM: f64 = 25.0;
-
 /// An explanation leaves at most this share of the error.
 const SHARE: f64 = 0.1;
-
-/// What shifts the readings of all rows if they were joined by time.
-const CLOCKS_DIFFER: &str =
-    ", or the clocks of tracker and controller differ by the time between two rows (--points-ahead)";
 
 /// Fewest rows to which a frame is fitted.
 const MIN_ROWS: usize = 8;
@@ -49,19 +44,34 @@ pub(crate) fn advice(explanation: Option<&str>) -> String {
 /// What else the readings may be, in a sentence part; `None` where nothing explains them.
 pub(crate) fn explanation(dataset: &Dataset, nominal: &Model) -> Option<String> {
     if dataset.sensor == Sensor::Cable {
-        return cable_factor::explanation(dataset, nominal);
+        return cable_factor::explanation(dataset, nominal)
+            .or_else(|| shifted_rows::explanation(dataset, nominal));
     }
-    if dataset.sensor != Sensor::Position || dataset.rows.len() < 2 * MIN_ROWS {
+    if dataset.rows.len() < 2 * MIN_ROWS {
         return None;
     }
-    let case = Case { dataset, nominal, most_mm: SHARE * typical_mm(dataset, nominal)? };
+    let (positions, poses) = match dataset.sensor {
+        Sensor::Pose => (&of_positions(dataset), Some(dataset)),
+        _ => (dataset, None),
+    };
+    let case = Case { dataset: positions, poses, nominal, most_mm: SHARE * typical_mm(dataset, nominal)? };
     case.sessions()
         .or_else(|| case.mirrored())
         .or_else(|| case.swapped_joints())
         .or_else(|| case.metres())
         .or_else(|| case.radians())
         .or_else(|| case.joint_convention())
-        .or_else(|| case.shifted())
+        .or_else(|| shifted_rows::explanation(positions, nominal))
+        .or_else(|| case.own_orientations())
+}
+
+/// The positions of targets whose poses were measured: they alone tell most mistakes, and nothing of the orientations hides those.
+fn of_positions(poses: &Dataset) -> Dataset {
+    let mut out = Dataset { sensor: Sensor::Position, ..poses.clone() };
+    for row in &mut out.rows {
+        row.reading = Reading::Position(row.reading.place_mm());
+    }
+    out
 }
 
 fn fitted_frames(dataset: &Dataset, nominal: &Model) -> Option<Frames> {
@@ -79,8 +89,32 @@ fn typical_mm(dataset: &Dataset, nominal: &Model) -> Option<f64> {
     median(&errors_mm(dataset, nominal, &fitted_frames(dataset, nominal)?))
 }
 
+/// Whether the orientations of poses are those of the arm.
+fn fits_in_orientation(poses: &Dataset, nominal: &Model) -> bool {
+    fitted_frames(poses, nominal)
+        .and_then(|frames| median_orientation_error(&Observations::logged(poses.clone()), nominal, &frames))
+        .is_some_and(|rad| rad < WRONG_ORIENTATION_RAD)
+}
+
+/// Poses in the mirror image of their frame: y, and of turns those about x and z, get the other sign.
+fn mirrored_poses(poses: &Dataset) -> Dataset {
+    let mut out = poses.clone();
+    for row in &mut out.rows {
+        if let Reading::Pose(pose) = &row.reading {
+            let (place, turn) = (pose.translation.vector, pose.rotation.into_inner());
+            let turn = UnitQuaternion::from_quaternion(Quaternion::new(turn.w, -turn.i, turn.j, -turn.k));
+            let place = Translation3::new(place.x, -place.y, place.z);
+            row.reading = Reading::Pose(Box::new(Pose::from_parts(place, turn)));
+        }
+    }
+    out
+}
+
 struct Case<'a> {
+    /// Rows with positions.
     dataset: &'a Dataset,
+    /// The same rows with orientations, where these were measured.
+    poses: Option<&'a Dataset>,
     nominal: &'a Model,
     /// Largest median error of rows that fit (mm).
     most_mm: f64,
@@ -118,7 +152,21 @@ impl Case<'_> {
             Some(Vector3::new(place.y, place.x, place.z))
         });
         self.fits(&swapped).then(|| {
-            "the readings are a mirror image: two of measured_x, measured_y and measured_z are swapped, or one has the other sign"
+            if self.poses.is_some_and(|poses| fits_in_orientation(&mirrored_poses(poses), self.nominal)) {
+                "the readings are a mirror image, positions and orientations alike: they are in a left-handed frame; give measured_y, measured_qx and \
+                 measured_qz the other sign"
+            } else {
+                "the readings are a mirror image: two of measured_x, measured_y and measured_z are swapped, or one has the other sign"
+            }
+            .to_owned()
+        })
+    }
+
+    /// Positions that fit by themselves, beside orientations that fit nothing.
+    fn own_orientations(&self) -> Option<String> {
+        (self.poses.is_some() && self.fits(self.dataset)).then(|| {
+            "the positions fit by themselves: check the order of measured_qw to measured_qz and that they belong to these rows, or delete these \
+             columns to use the positions alone"
                 .to_owned()
         })
     }
@@ -225,38 +273,6 @@ impl Case<'_> {
     fn few(&self) -> Dataset {
         let step = self.dataset.rows.len().div_ceil(MANY).max(1);
         self.dataset.subset(&(0..self.dataset.rows.len()).step_by(step).collect::<Vec<_>>())
-    }
-
-    /// From some row on each reading belongs to the row after it, or before it.
-    fn shifted(&self) -> Option<String> {
-        let count = self.dataset.rows.len();
-        [1_isize, -1].into_iter().find_map(|step| {
-            let source = |row: usize| row.checked_add_signed(-step).filter(|other| *other < count);
-            let moved = self.with_readings(|row| Some(self.dataset.rows[source(row)?].reading.place_mm()));
-            let last = moved.rows.len() - moved.rows.len() / 3;
-            let tail = moved.subset(&(last..moved.rows.len()).collect::<Vec<_>>());
-            let frames = fitted_frames(&tail, self.nominal)?;
-            let good = |mm: &f64| *mm <= self.most_mm;
-            let moved_mm = errors_mm(&moved, self.nominal, &frames);
-            if !moved_mm[last..].iter().all(good) {
-                return None;
-            }
-            let begin = moved_mm.iter().rposition(|mm| !good(mm)).map_or(0, |row| row + 1);
-            let first = self.dataset.rows.iter().position(|row| row.number == moved.rows[begin].number)?;
-            // What stands before must fit as it is.
-            let own_mm = errors_mm(self.dataset, self.nominal, &frames);
-            let before = first.saturating_sub(1);
-            let off = own_mm[..before].iter().filter(|mm| !good(mm)).count();
-            let number = self.dataset.rows[source(first)?].number;
-            (off <= before / 10).then(|| {
-                let clocks = if self.dataset.joined_by_time { CLOCKS_DIFFER } else { "" };
-                if step > 0 {
-                    format!("from row {number} on each reading belongs to the row after it: a reading is missing there{clocks}")
-                } else {
-                    format!("from row {number} on each reading belongs to the row before it: there is one reading too many{clocks}")
-                }
-            })
-        })
     }
 
     /// The rows with other readings; those without one are left out.

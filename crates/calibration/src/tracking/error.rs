@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::identification::misreading::OTHER_ARM_MM;
+use crate::identification::fit::OTHER_ARM_MM;
 use crate::identification::start::StartError;
 use crate::measurement::dataset::Sensor;
 

@@ -19,5 +19,6 @@ mod found;
 mod in_doubt;
 mod joint_scatter;
 mod one_orientation;
+mod other_gravity;
 mod parts;
 mod rules;

@@ -6,14 +6,12 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::base_tilt::TiltTerm;
 use truegrind_arm::estimated::Estimated;
+use truegrind_arm::gravity::STANDARD_GRAVITY;
 use truegrind_programs::motion::Listing;
 use truegrind_programs::motion::load::Loads;
 
 /// Share of the rated payload, or else of the measured load, by which a load may differ and still count as the same.
 const SAME_LOAD: f64 = 0.05;
-
-/// Standard gravity (m/s²).
-const STANDARD_GRAVITY: f64 = 9.806_65;
 
 /// A load up to this (kg) is none: tool0 weighs a gram.
 const NO_LOAD_KG: f64 = 0.1;

@@ -2,12 +2,13 @@
 
 use super::payload::payload_at;
 use crate::line_list::lines_of;
+use truegrind_arm::gravity::STANDARD_GRAVITY;
 use truegrind_arm::robots;
 use truegrind_programs::motion::Listing;
 use truegrind_programs::motion::load::Loads;
 
 const KG_PER_POUND: f64 = 0.453_592_37;
-const KG_PER_NEWTON: f64 = 1.0 / 9.806_65;
+const KG_PER_NEWTON: f64 = 1.0 / STANDARD_GRAVITY;
 
 /// The rated payload of an arm of the catalogue (kg), where its data sheet states it.
 pub fn rated_payload_kg(robot: &str) -> Option<f64> {

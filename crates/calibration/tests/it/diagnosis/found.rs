@@ -67,6 +67,9 @@ fn a_zero_that_jumped_is_told_with_its_rows() {
     let finding = &out.diagnosed.diagnosis.findings[0];
     assert_eq!(finding.rows, Some([120, 219]));
     assert_eq!(finding.confidence, Confidence::Identified);
+    // In words, with the statistician's figure in brackets.
+    let words = "the readings are over 1000 times more probable with it than without (2 ln Bayes factor ";
+    assert!(finding.evidence.contains(words), "{}", finding.evidence);
     assert!(!finding.alternatives.is_empty(), "what else was tried is shown");
     let offset = &finding.parameters[0];
     assert!((offset.value - 0.8).abs() < 3.0 * offset.sigma.unwrap());
