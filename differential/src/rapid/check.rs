@@ -217,8 +217,8 @@ impl Comparison<'_> {
         if own.is_some_and(|row| row.status != Status::Left) {
             return own;
         }
-        let calls = motion.calls.iter().rev().filter_map(|at| of(*at));
-        calls.filter(|row| own.is_none() || row.status != Status::Left).next().or(own)
+        let mut calls = motion.calls.iter().rev().filter_map(|at| of(*at));
+        calls.find(|row| own.is_none() || row.status != Status::Left).or(own)
     }
 
     fn run(mut self, before: &Run<'_>, after: &Run<'_>) -> Tally {

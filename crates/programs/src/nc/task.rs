@@ -141,13 +141,45 @@ impl<'s> Task<'s> {
         task.listing.nc.open_controls = open.filter_map(first).collect();
         task.listing.nc.unstated_lengths = task.unstated_lengths();
         task.listing.nc.unstated_turns = task.unstated_turns();
-        let Listing { nc, tools, work_objects, .. } = &mut task.listing;
-        let is_used = |name: &str| {
-            tools.iter().any(|tool| tool.name == name)
-                || work_objects.iter().any(|object| object.name == name)
-        };
-        nc.replaced_frames.retain(|_, replaced| is_used(&replaced.name));
+        task.keep_contradictions();
         task
+    }
+
+    /// Of the frames that the program sets otherwise than they are stated, keeps those that a motion uses and none used before as stated: there
+    /// the program changes them on purpose.
+    fn keep_contradictions(&mut self) {
+        let mut replaced = std::mem::take(&mut self.listing.nc.replaced_frames);
+        if replaced.is_empty() {
+            return;
+        }
+        let stated: HashMap<(u32, &str), Frame> =
+            replaced.iter().map(|(place, one)| ((place.file, &*one.name), one.stated)).collect();
+        // By file and name, where a motion first used it as stated; nothing where it was used otherwise alone.
+        let mut used: HashMap<(u32, String), Option<Place>> = HashMap::new();
+        let listing = &self.listing;
+        let alike = |a: &Motion, b: &Motion| a.same_frames(b) && a.place.file == b.place.file;
+        for run in listing.motions.chunk_by(alike) {
+            let motion = &run[0];
+            let tool = listing.tool(motion);
+            let tool = tool.map(|tool| (&*tool.name, tool.value.as_ref().ok().map(|value| value.frame)));
+            let object = listing.work_object(motion);
+            let object = object
+                .map(|object| (&*object.name, object.value.as_ref().ok().map(|value| value.user_frame)));
+            let file = motion.place.file;
+            for (name, frame) in tool.into_iter().chain(object) {
+                let Some(stated) = stated.get(&(file, name)) else { continue };
+                let first = used.entry((file, name.to_owned())).or_default();
+                if frame == Some(*stated) {
+                    *first = first.or(Some(motion.place));
+                }
+            }
+        }
+        drop(stated);
+        replaced.retain(|place, one| match used.get(&(place.file, one.name.clone())) {
+            Some(first) => first.is_none_or(|first| first > *place),
+            None => false,
+        });
+        self.listing.nc.replaced_frames = replaced;
     }
 
     /// See [`crate::motion::NcFacts::unstated_turns`].

@@ -309,6 +309,8 @@ fn a_frame_that_the_program_sets_otherwise_than_it_is_stated_is_listed() {
     assert_eq!(siemens("G71\n$P_UIFR[1]=CTRANS(X,400)"), of(7, "G54", [400.0, 0.0, 0.0], stated));
     assert_eq!(siemens("G71\n$P_UIFR[1]=CTRANS(X,500):CROT(Z,1)").len(), 1);
     assert_eq!(siemens("G71\n$TC_DP3[1,1]=90"), of(7, "T1", [0.0, 0.0, 90.0], [0.0, 0.0, 100.0]));
+    // Where a motion used it as stated before, the program changes it on purpose.
+    assert_eq!(siemens(&format!("G71\nT1 D1\nG54\nTRAORI\n{S}\n$P_UIFR[1]=CTRANS(X,400)")), []);
     // The same value, one that no motion uses, one that is not known.
     for set in [
         "G71\n$P_UIFR[1]=CTRANS(X,500.001)",
