@@ -6,7 +6,9 @@
 //! found, with the odds of a file that states no mount and the number of directions against it. Deflections are linear in the direction, so that
 //! it and its opposite explain the same: masses, which are positive, tell them apart.
 
-use nalgebra::{DMatrix, Vector3};
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use super::catalogue::{Candidate, weight_candidates};
@@ -15,7 +17,7 @@ use super::cause_kind::CauseKind;
 use super::confirmation::CLEAR_TWICE_LOG_BF;
 use super::design::{Design, FullDesign, side_by_side};
 use super::extension::{Extended, Subject};
-use super::score::{Score, VISIBLE, score_columns};
+use super::score::{Score, VISIBLE, score_columns, score_from};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 use truegrind_math::work::checkpoint;
@@ -48,9 +50,6 @@ const SLANTED: usize = DIRECTIONS.len() - STRAIGHT;
 /// Most deflections that are selected under one direction.
 const MAX_SELECTED: usize = 3;
 
-/// Directions that are searched beyond the first deflection.
-const MAX_SEARCHED: usize = 3;
-
 /// Cosine from which a direction is that of the file.
 const SAME: f64 = 0.9;
 
@@ -65,9 +64,107 @@ pub(super) struct OtherGravity {
 
 /// Deflections under one direction of gravity.
 struct Selected {
-    chosen: Vec<(Candidate, DMatrix<f64>)>,
+    /// Places in [`Deflections::causes`].
+    chosen: Vec<usize>,
     merit: f64,
     score: Option<Score>,
+}
+
+/// The deflections that weight can cause, under gravity along each axis of the base: they are linear in gravity, so that those under any direction
+/// follow without another pass over the rows.
+struct Deflections {
+    causes: Vec<Cause>,
+    /// Prior standard deviations of the parameters, by cause.
+    sizes: Vec<Vec<f64>>,
+    /// Variants tried, by cause.
+    tried: Vec<f64>,
+    /// Places of the parameters among all W of one axis, by cause.
+    places: Vec<Range<usize>>,
+    /// Gradient (3 W) and information (3 W × 3 W), axis by axis.
+    gradient: DVector<f64>,
+    information: DMatrix<f64>,
+}
+
+/// Gradient (W) and information (W × W) of all deflections under one direction.
+struct Along(DVector<f64>, DMatrix<f64>);
+
+impl Deflections {
+    fn of(subject: &Subject<'_>, design: &Design) -> Self {
+        let axes: Vec<Vec<(Candidate, DMatrix<f64>)>> = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+            .par_iter()
+            .map(|&axis| {
+                checkpoint();
+                let nominal = Model { gravity: in_base(axis), ..subject.nominal.clone() };
+                let turned = Subject { nominal: &nominal, ..*subject };
+                let with_columns = |candidate: Candidate| {
+                    let columns = candidate.columns(design);
+                    (candidate, columns)
+                };
+                weight_candidates(&turned).into_iter().map(with_columns).collect()
+            })
+            .collect();
+        let columns = axes.iter().flatten().map(|(_, columns)| columns);
+        let projected = design.project(&side_by_side(columns, design.rows()));
+        let of_axis: Vec<&Candidate> = axes[0].iter().map(|(candidate, _)| candidate).collect();
+        let sizes: Vec<Vec<f64>> = of_axis.iter().map(|candidate| candidate.cause.sizes()).collect();
+        let mut end = 0;
+        let places = sizes.iter().map(|sizes| {
+            end += sizes.len();
+            end - sizes.len()..end
+        });
+        Self {
+            places: places.collect(),
+            sizes,
+            tried: of_axis.iter().map(|candidate| candidate.tried).collect(),
+            causes: of_axis.into_iter().map(|candidate| candidate.cause.clone()).collect(),
+            gradient: projected.gradient,
+            information: projected.information,
+        }
+    }
+
+    fn along(&self, direction: [i8; 3]) -> Along {
+        let width = self.gradient.len() / 3;
+        let direction = in_base(direction);
+        let (mut gradient, mut information) = (DVector::zeros(width), DMatrix::zeros(width, width));
+        for (a, along) in direction.iter().enumerate() {
+            gradient += self.gradient.rows(a * width, width) * *along;
+            for (b, other) in direction.iter().enumerate() {
+                information +=
+                    self.information.view((a * width, b * width), (width, width)) * (along * other);
+            }
+        }
+        Along(gradient, information)
+    }
+
+    /// The score of some of them together.
+    fn score(&self, chosen: &[usize], Along(gradient, information): &Along) -> Score {
+        let places: Vec<usize> = chosen.iter().flat_map(|&k| self.places[k].clone()).collect();
+        let sizes: Vec<f64> = chosen.iter().flat_map(|&k| self.sizes[k].iter().copied()).collect();
+        let tried: f64 = chosen.iter().map(|&k| self.tried[k]).product();
+        let information = information.select_rows(&places).select_columns(&places);
+        score_from((gradient.select_rows(&places), information), &sizes, tried)
+    }
+
+    /// Forward selection under gravity along a direction, by evidence.
+    fn select(&self, direction: [i8; 3]) -> Selected {
+        let along = self.along(direction);
+        let mut out = Selected { chosen: Vec::new(), merit: 0.0, score: None };
+        while out.chosen.len() < MAX_SELECTED {
+            let of = |k: usize| (self.causes[k].kind(), self.causes[k].joints());
+            let is_left = |k: &usize| out.chosen.iter().all(|&other| of(other) != of(*k));
+            let scored = (0..self.causes.len()).filter(is_left).map(|k| {
+                let all: Vec<usize> = out.chosen.iter().copied().chain([k]).collect();
+                (k, self.score(&all, &along))
+            });
+            let Some((k, score)) = scored.max_by(|a, b| a.1.merit.total_cmp(&b.1.merit)) else { break };
+            if !(score.merit > out.merit) {
+                break;
+            }
+            out.chosen.push(k);
+            (out.merit, out.score) = (score.merit, Some(score));
+        }
+        out
+    }
 }
 
 impl OtherGravity {
@@ -97,24 +194,23 @@ impl OtherGravity {
         let found = columns.first().map_or(0.0, |first| {
             score_columns(&design, &side_by_side(&columns, first.nrows()), &sizes, variants).merit
         });
-        let mut ways: Vec<([i8; 3], Selected)> = DIRECTIONS
+        let deflections = Deflections::of(subject, &design);
+        let (direction, best) = DIRECTIONS
             .par_iter()
-            .map(|&direction| (direction, Selected::under(direction, subject, &design, 1)))
-            .collect();
-        ways.sort_by(|a, b| b.1.merit_of(b.0).total_cmp(&a.1.merit_of(a.0)));
-        ways.truncate(MAX_SEARCHED);
-        let (direction, best) = ways
-            .into_par_iter()
-            .map(|(direction, _)| (direction, Selected::under(direction, subject, &design, MAX_SELECTED)))
+            .map(|&direction| (direction, deflections.select(direction)))
             .max_by(|a, b| a.1.merit_of(a.0).total_cmp(&b.1.merit_of(b.0)))?;
         let merit = best.merit_of(direction);
-        let sign = if best.mass() < 0.0 { -1 } else { 1 };
+        let sign = if best.mass(&deflections) < 0.0 { -1 } else { 1 };
         let direction = direction.map(|along| sign * along);
         let stated = subject.nominal.gravity;
         let other = Self {
             direction,
             stated,
-            yields: best.chosen.iter().map(|(c, _)| (c.cause.kind(), c.cause.joints())).collect(),
+            yields: best
+                .chosen
+                .iter()
+                .map(|&k| (deflections.causes[k].kind(), deflections.causes[k].joints()))
+                .collect(),
         };
         let contradicts_some = of_arm.iter().any(|&k| other.contradicts(&fit.causes[k]));
         let margin = if contradicts_some { -CLEAR_TWICE_LOG_BF } else { CLEAR_TWICE_LOG_BF };
@@ -184,42 +280,6 @@ fn in_words(direction: &Vector3<f64>) -> String {
 }
 
 impl Selected {
-    /// Forward selection of deflections under gravity along a direction, by evidence.
-    fn under(direction: [i8; 3], subject: &Subject<'_>, design: &Design, most: usize) -> Self {
-        let nominal = Model { gravity: in_base(direction), ..subject.nominal.clone() };
-        let turned = Subject { nominal: &nominal, ..*subject };
-        let mut left: Vec<(Candidate, DMatrix<f64>)> = weight_candidates(&turned)
-            .into_iter()
-            .map(|candidate| {
-                let columns = candidate.columns(design);
-                (candidate, columns)
-            })
-            .collect();
-        let mut out = Self { chosen: Vec::new(), merit: 0.0, score: None };
-        while out.chosen.len() < most {
-            checkpoint();
-            let scored = left.iter().enumerate().map(|(k, next)| (k, out.with(next, design)));
-            let Some((k, score)) = scored.max_by(|a, b| a.1.merit.total_cmp(&b.1.merit)) else { break };
-            if !(score.merit > out.merit) {
-                break;
-            }
-            let next = left.swap_remove(k);
-            let of_next = (next.0.cause.kind(), next.0.cause.joints());
-            left.retain(|(other, _)| (other.cause.kind(), other.cause.joints()) != of_next);
-            out.chosen.push(next);
-            (out.merit, out.score) = (score.merit, Some(score));
-        }
-        out
-    }
-
-    fn with(&self, next: &(Candidate, DMatrix<f64>), design: &Design) -> Score {
-        let all: Vec<&(Candidate, DMatrix<f64>)> = self.chosen.iter().chain([next]).collect();
-        let sizes: Vec<f64> = all.iter().flat_map(|(candidate, _)| candidate.cause.sizes()).collect();
-        let tried: f64 = all.iter().map(|(candidate, _)| candidate.tried).product();
-        let columns = side_by_side(all.iter().map(|(_, columns)| columns), next.1.nrows());
-        score_columns(design, &columns, &sizes, tried)
-    }
-
     /// The merit less the odds against the direction.
     fn merit_of(&self, direction: [i8; 3]) -> f64 {
         let is_straight = direction.iter().filter(|along| **along != 0).count() == 1;
@@ -228,13 +288,13 @@ impl Selected {
     }
 
     /// Compliance times mass of the first deflection, over its lumps: its sign is that of gravity.
-    fn mass(&self) -> f64 {
-        let (Some((first, _)), Some(score)) = (self.chosen.first(), &self.score) else { return 0.0 };
-        let masses = match &first.cause {
+    fn mass(&self, deflections: &Deflections) -> f64 {
+        let (Some(&first), Some(score)) = (self.chosen.first(), &self.score) else { return 0.0 };
+        let masses = match &deflections.causes[first] {
             Cause::Arm(Effect::LumpedCompliance(load)) => {
                 load.lump.iter().filter(|lump| lump.moment.is_none()).count()
             }
-            Cause::Measurement(_) => first.cause.sizes().len().min(3),
+            Cause::Measurement(_) => deflections.sizes[first].len().min(3),
             Cause::Arm(_) => 1,
         };
         score.estimate.iter().take(masses).sum()

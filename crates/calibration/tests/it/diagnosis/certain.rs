@@ -181,7 +181,9 @@ fn a_late_reading_where_a_path_turns_back_is_no_outlier() {
             ("latency", Confidence::Identified),
             "{delay_s}"
         );
-        assert!(found.set_aside.is_empty(), "{delay_s}: {:?}", found.set_aside);
+        // The first row and the last have no speed on one side.
+        let ends = [0, dataset.rows.len() - 1];
+        assert!(found.set_aside.iter().all(|row| ends.contains(row)), "{delay_s}: {:?}", found.set_aside);
         let late = &first.parameters[0];
         assert!((late.value + delay_s).abs() < 4.0 * late.sigma.unwrap() + 1e-4, "{late:?}");
         assert!(found.diagnosis.fits.extended.cv_rmse_mm < 1.15 * 0.02 * 3_f64.sqrt());

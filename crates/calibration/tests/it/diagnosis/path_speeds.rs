@@ -11,7 +11,7 @@ use truegrind_calibration::measurement::dataset::{Dataset, Rates, Reading, Row, 
 /// Rows at times of 1 h on a path that turns from `first` to `second` at `corner_h`.
 fn rates(first: Joints, second: Joints, corner_h: f64) -> Vec<Option<Rates>> {
     let at = |hours: f64| first * hours.min(corner_h) + second * (hours - corner_h).max(0.0);
-    let rows: Vec<Row> = (0..40)
+    let rows: Vec<Row> = (0..60)
         .map(|number| {
             let hours = f64::from(number);
             let place = Vector3::new(600.0 + 1.7 * hours, 20.0, 500.0);
@@ -36,8 +36,8 @@ fn assert_near(found: Joints, wanted: Joints) {
 #[test]
 fn a_corner_at_a_row_has_both_speeds() {
     let [first, second] = speeds();
-    let all = rates(first, second, 20.0);
-    let corner = all[20].unwrap();
+    let all = rates(first, second, 30.0);
+    let corner = all[30].unwrap();
     assert!(corner.is_corner());
     assert_near(corner.mean, 0.5 * (first + second));
     assert_near(corner.before, first);
@@ -48,9 +48,9 @@ fn a_corner_at_a_row_has_both_speeds() {
 #[test]
 fn beside_a_corner_between_rows_the_arm_has_one_speed() {
     let [first, second] = speeds();
-    for corner_h in [20.3, 20.5, 20.8] {
+    for corner_h in [30.3, 30.5, 30.8] {
         let all = rates(first, second, corner_h);
-        for (row, speed) in [(20, first), (21, second)] {
+        for (row, speed) in [(30, first), (31, second)] {
             let beside = all[row].unwrap();
             assert!(beside.is_corner());
             assert_near(beside.before, speed);
