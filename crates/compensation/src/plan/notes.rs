@@ -316,7 +316,8 @@ fn replaced_frame_note(listing: &Listing, place: Place, frame: &ReplacedFrame) -
     };
     let line = numbered(&listing.files, [place].into_iter()).unwrap_or_default();
     format!(
-        "{name}: {line} sets it to {}, the cell file or a comment states {}: {:.2} mm and {:.3}° apart. Behind that line the motions in it are corrected          for what the program sets. Correct the one that is wrong, or leave its value out of the cell file",
+        "{name}: {line} sets it to {}, the cell file or a comment states {}: {:.2} mm and {:.3}° apart. Behind that line the motions in it are corrected \
+         for what the program sets. Correct the one that is wrong, or leave its value out of the cell file",
         text(set),
         text(stated),
         (to.translation.vector - from.translation.vector).norm(),
@@ -337,7 +338,8 @@ fn position_decisions_note(listing: &Listing) -> Option<String> {
 fn several_mains_note(listing: &Listing) -> Option<String> {
     let lines = numbered(&listing.files, listing.mains.iter().copied())?;
     Some(format!(
-        "{} procedures main: a controller loads a task with one. The files were read as the modules of one task, so that their cuts were placed and          judged together; if they are separate programs, give --each ({lines})",
+        "{} procedures main: a controller loads a task with one. The files were read as the modules of one task, so that their cuts were placed and \
+         judged together; if they are separate programs, give --each ({lines})",
         listing.mains.len()
     ))
 }
