@@ -164,10 +164,24 @@ impl Walk {
     /// each reached by a step as the rows were.
     pub fn fresh(&self, sheet: &Sheet, count: usize, rng: &mut impl Rng) -> Vec<Visit> {
         let n = self.visits.len();
-        let mut places: Vec<f64> =
-            (0..count.div_ceil(self.repeats)).map(|_| between(rng, 1.0, (n - 2) as f64)).collect();
+        let mut places: Vec<f64> = (0..count.div_ceil(self.repeats))
+            .map(|_| self.off_ends(between(rng, 1.0, (n - 2) as f64)))
+            .collect();
         places.sort_by(f64::total_cmp);
         places.into_iter().flat_map(|place| self.beside(sheet, place, rng)).collect()
+    }
+
+    /// A place of a raster that is not beside the end of a line: a row stands there in every run of the path, and none beside it.
+    fn off_ends(&self, place: f64) -> f64 {
+        let is_beside = |low: usize| (low..=low + 1).any(|row| self.turns_at(row));
+        let low = place.floor() as usize;
+        if self.design != Design::Raster || !is_beside(low) {
+            return place;
+        }
+        let last = self.visits.len() - 3;
+        let other =
+            (low..last).find(|low| !is_beside(*low)).or_else(|| (1..low).rev().find(|low| !is_beside(*low)));
+        other.unwrap_or(low) as f64 + place.fract()
     }
 
     /// Whether the path turns sharply at a row.
@@ -182,9 +196,6 @@ impl Walk {
     /// One fresh place with what leads there and away. `place` counts rows.
     fn beside(&self, sheet: &Sheet, place: f64, rng: &mut impl Rng) -> Vec<Visit> {
         let low = place.floor() as usize;
-        // At the end of a line stands a row, in every run of the path.
-        let at_end = self.design == Design::Raster && (low..=low + 1).any(|row| self.turns_at(row));
-        let place = if at_end { place.floor() } else { place };
         let share = place.fract();
         let (a, b) = (&self.visits[low], &self.visits[low + 1]);
         let idle = self.pause.is_some_and(|p| p[0] >= a.hours && p[1] <= b.hours);
