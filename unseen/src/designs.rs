@@ -195,8 +195,7 @@ impl Walk {
 
     /// One fresh place with what leads there and away. `place` counts rows.
     fn beside(&self, sheet: &Sheet, place: f64, rng: &mut impl Rng) -> Vec<Visit> {
-        let low = place.floor() as usize;
-        let share = place.fract();
+        let (low, share) = (place.floor() as usize, place.fract());
         let (a, b) = (&self.visits[low], &self.visits[low + 1]);
         let idle = self.pause.is_some_and(|p| p[0] >= a.hours && p[1] <= b.hours);
         let hours = if idle { a.hours } else { a.hours + share * (b.hours - a.hours) };
